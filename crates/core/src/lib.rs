@@ -1,0 +1,41 @@
+//! Contracts of Tractrix: what the rooms say to each other.
+//!
+//! SI units and radians everywhere, the unit in every name. ISO 8855 axes: x forward, y left,
+//! z up, yaw counter-clockwise. Road frame: `s` along the route, `d` to the left of the reference
+//! line; grade positive uphill, bank positive with the left side up.
+//!
+//! **One reference point**: the centre of the tractor's drive-axle group, on the ground. Every
+//! ego position, velocity and road coordinate refers to it (see [`Geometry`]).
+//!
+//! Left out on purpose: algorithms, I/O, clocks and random numbers. The crate is `no_std + alloc`,
+//! so that the same types run on the on-truck computer.
+#![cfg_attr(not(feature = "std"), no_std)]
+extern crate alloc;
+
+mod command;
+mod ego;
+mod error;
+mod limits;
+mod plan;
+mod scene;
+mod seams;
+mod table;
+mod time;
+
+pub use command::{BrakeMode, Command, GearRequest};
+pub use ego::{EgoState, PowertrainSignals, TrailerState};
+pub use error::CoreError;
+pub use limits::{
+    BrakeLimits, FuelModel, Geometry, LateralLimits, PowertrainLimits, RPM_PER_RAD_S, RoadLoad,
+    VehicleLimits,
+};
+pub use plan::{GuardReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus, SpeedPoint};
+pub use scene::{Neighbour, Scene, VehicleClass};
+pub use seams::{Recorder, Stamped, Tick, TrafficSource, Vehicle};
+pub use table::{Curve, Grid};
+pub use time::Time;
+
+/// Standard gravity, m/s² (ISO 80000-3).
+pub const GRAVITY_M_S2: f64 = 9.806_65;
+/// Specific gas constant of dry air, J/(kg K).
+pub const GAS_CONSTANT_AIR_J_KG_K: f64 = 287.05;

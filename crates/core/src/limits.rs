@@ -1,0 +1,218 @@
+//! What a planner may know about the truck: geometry, powertrain, road load, brakes, handling.
+//!
+//! The planner never sees the plant's model. A simulated truck fills these from its truck file, a
+//! real one from its data sheet and its estimators.
+
+use alloc::vec::Vec;
+use serde::{Deserialize, Serialize};
+
+use crate::{Curve, Grid};
+
+/// Lengths of the combination. "Ahead" and "behind" refer to the reference point: the centre of
+/// the tractor's drive-axle group, on the ground.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Geometry {
+    /// Front bumper ahead of the reference point, m.
+    pub front_m: f64,
+    /// Steer axle ahead of the reference point, m (wheelbase L of Eq. 1).
+    pub wheelbase_m: f64,
+    /// Tractor centre of gravity ahead of the reference point, m (L_c2 of Fig. 7).
+    pub cg_ahead_m: f64,
+    /// Hitch ahead of the reference point, m (minus L_1 of Eq. 1).
+    pub hitch_ahead_m: f64,
+    /// Trailer axle-group centre behind the hitch, m (L_2 of Eq. 1).
+    pub hitch_to_trailer_axle_m: f64,
+    /// Trailer front edge ahead of the hitch, m.
+    pub trailer_front_m: f64,
+    /// Trailer rear bumper behind the hitch, m.
+    pub trailer_rear_m: f64,
+    /// Tractor rear end behind the reference point, m.
+    pub tractor_rear_m: f64,
+    /// Body width, m.
+    pub width_m: f64,
+}
+
+impl Geometry {
+    /// Rear bumper behind the reference point when the combination is straight, m.
+    #[must_use]
+    pub fn rear_m(&self) -> f64 {
+        self.trailer_rear_m - self.hitch_ahead_m
+    }
+
+    /// Overall length when straight, m.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        self.front_m + self.rear_m()
+    }
+}
+
+/// Fuel mass flow from engine speed and torque.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum FuelModel {
+    /// Willans line on indicated power: `idle + per_rpm n + per_kw P_ind`.
+    Willans {
+        /// Constant part, g/s.
+        constant_g_s: f64,
+        /// Part per engine speed, g/s per rpm.
+        per_rpm_g_s: f64,
+        /// Part per indicated power, g/s per kW.
+        per_kw_g_s: f64,
+    },
+    /// Brake-specific consumption map over speed (rad/s) and brake torque (Nm), g/kWh, with the
+    /// flow at zero brake torque as a separate curve over speed.
+    Map {
+        /// g/kWh over (engine speed rad/s, brake torque Nm).
+        bsfc_g_kwh: Grid,
+        /// g/s over engine speed (rad/s) at zero brake torque.
+        zero_torque_g_s: Curve,
+    },
+}
+
+impl FuelModel {
+    /// Fuel flow, g/s. `indicated_nm` is the gas torque, `friction_nm` the positive friction
+    /// torque; brake torque is their difference. Zero when nothing is injected (fuel cut).
+    ///
+    /// The map is blended between the zero-torque curve and its lowest torque row, where BSFC
+    /// diverges.
+    #[must_use]
+    pub fn rate_g_s(&self, speed_rad_s: f64, indicated_nm: f64, friction_nm: f64) -> f64 {
+        if indicated_nm <= 0.0 {
+            return 0.0;
+        }
+        match self {
+            Self::Willans { constant_g_s, per_rpm_g_s, per_kw_g_s } => {
+                constant_g_s
+                    + per_rpm_g_s * speed_rad_s * RPM_PER_RAD_S
+                    + per_kw_g_s * indicated_nm * speed_rad_s * 1e-3
+            }
+            Self::Map { bsfc_g_kwh, zero_torque_g_s } => {
+                let brake_nm = indicated_nm - friction_nm;
+                let zero = zero_torque_g_s.at(speed_rad_s);
+                let flow = |t: f64| bsfc_g_kwh.at(speed_rad_s, t) * t * speed_rad_s * 1e-3 / 3600.0;
+                let lowest = bsfc_g_kwh.y()[0].max(1.0);
+                if brake_nm >= lowest {
+                    flow(brake_nm)
+                } else if brake_nm >= 0.0 {
+                    zero + (flow(lowest) - zero) * brake_nm / lowest
+                } else {
+                    zero * indicated_nm / friction_nm.max(1e-9)
+                }
+            }
+        }
+    }
+}
+
+/// Revolutions per minute in one rad/s.
+pub const RPM_PER_RAD_S: f64 = 9.549_296_585_513_72;
+
+/// Engine and driveline as a planner needs them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PowertrainLimits {
+    /// Gearbox ratios, first gear first.
+    pub gear_ratios: Vec<f64>,
+    /// Efficiency gearbox input to wheel, per gear, 0 to 1.
+    pub gear_efficiency_frac: Vec<f64>,
+    /// Rotating inertia felt as mass at the wheels with the clutch closed, kg, per gear.
+    pub rotating_mass_kg: Vec<f64>,
+    /// Rotating inertia felt as mass with the driveline open, kg.
+    pub rotating_mass_neutral_kg: f64,
+    /// Final drive ratio.
+    pub final_drive_ratio: f64,
+    /// Dynamic wheel radius, m.
+    pub wheel_radius_m: f64,
+    /// Full-load brake torque over engine speed (rad/s), Nm.
+    pub full_load_nm: Curve,
+    /// Friction torque over engine speed (rad/s), Nm, positive.
+    pub friction_nm: Curve,
+    /// Engine-brake and retarder torque at the crank at full demand over engine speed, Nm, positive.
+    pub engine_brake_nm: Curve,
+    /// Auxiliary power at the crank, W.
+    pub auxiliary_power_w: f64,
+    /// Idle speed, rad/s.
+    pub idle_speed_rad_s: f64,
+    /// Highest governed speed, rad/s.
+    pub max_speed_rad_s: f64,
+    /// Fuel flow.
+    pub fuel: FuelModel,
+    /// Fuel flow at idle with the driveline open, g/s.
+    pub idle_fuel_g_s: f64,
+    /// Time without traction during a shift, s.
+    pub shift_duration_s: f64,
+    /// Indicated torque over (pedal 0 to 1, engine speed rad/s), Nm. `None`: torque = pedal ×
+    /// (full load + friction).
+    pub pedal_map_nm: Option<Grid>,
+    /// Density of the fuel, kg/m³.
+    pub fuel_density_kg_m3: f64,
+}
+
+/// Forces that resist motion on a straight road.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct RoadLoad {
+    /// Total mass, kg (estimate on a real truck).
+    pub mass_kg: f64,
+    /// Drag area, m².
+    pub cd_a_m2: f64,
+    /// Air density, kg/m³.
+    pub air_density_kg_m3: f64,
+    /// Rolling resistance coefficient, dimensionless.
+    pub rolling_coeff: f64,
+}
+
+/// Brakes as a planner needs them.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct BrakeLimits {
+    /// Largest service deceleration that may be relied on at this mass, m/s², level road.
+    pub max_decel_m_s2: f64,
+    /// Dead time of the pneumatics, s.
+    pub dead_time_s: f64,
+    /// Time from the first pressure to the full one, s.
+    pub build_up_s: f64,
+}
+
+/// Handling as a lateral controller needs it (linear single-track with trailer).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct LateralLimits {
+    /// Steering ratio, hand wheel to road wheel.
+    pub steering_ratio: f64,
+    /// Steering lag, s.
+    pub steering_lag_s: f64,
+    /// Tractor mass, kg.
+    pub tractor_mass_kg: f64,
+    /// Tractor yaw inertia, kg m².
+    pub tractor_inertia_kg_m2: f64,
+    /// Trailer mass with payload, kg.
+    pub trailer_mass_kg: f64,
+    /// Trailer yaw inertia with payload, kg m².
+    pub trailer_inertia_kg_m2: f64,
+    /// Trailer centre of gravity behind the hitch, m.
+    pub trailer_cg_behind_hitch_m: f64,
+    /// Half the drive-axle spread, m (i_2).
+    pub drive_half_spread_m: f64,
+    /// Half the trailer-group spread, m (i_3).
+    pub trailer_half_spread_m: f64,
+    /// Cornering stiffness of the steer axle, N/rad.
+    pub steer_stiffness_n_rad: f64,
+    /// Cornering stiffness of all drive axles together, N/rad.
+    pub drive_stiffness_n_rad: f64,
+    /// Cornering stiffness of all trailer axles together, N/rad.
+    pub trailer_stiffness_n_rad: f64,
+    /// Lateral acceleration at which the inner wheels lift, m/s².
+    pub rollover_accel_m_s2: f64,
+    /// Largest road-wheel angle, rad.
+    pub max_road_wheel_rad: f64,
+}
+
+/// Everything that a planner may know about the truck.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VehicleLimits {
+    /// Lengths.
+    pub geometry: Geometry,
+    /// Engine and driveline.
+    pub powertrain: PowertrainLimits,
+    /// Road load.
+    pub road_load: RoadLoad,
+    /// Brakes.
+    pub brakes: BrakeLimits,
+    /// Handling.
+    pub lateral: LateralLimits,
+}

@@ -1,0 +1,79 @@
+//! The seam traits: each has two real implementations or more.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Command, EgoState, Plan, Scene, Time, VehicleLimits};
+
+/// A value and the time at which it was true.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Stamped<T> {
+    /// When the value was measured.
+    pub time: Time,
+    /// The value.
+    pub value: T,
+}
+
+/// A truck: simulated directly, simulated behind a bus, or real.
+pub trait Vehicle {
+    /// What can go wrong at this seam.
+    type Error: core::error::Error;
+    /// The latest state at `now`.
+    ///
+    /// # Errors
+    /// When the truck cannot be read at all; an old state is returned with its old stamp instead.
+    fn ego(&mut self, now: Time) -> Result<Stamped<EgoState>, Self::Error>;
+    /// Gives the command that acts from `now` to the next tick.
+    ///
+    /// # Errors
+    /// When the command cannot be delivered.
+    fn command(&mut self, now: Time, command: &Command) -> Result<(), Self::Error>;
+    /// What the truck can do, as far as it is known now (mass estimate included).
+    fn limits(&self) -> &VehicleLimits;
+}
+
+/// Where the other vehicles come from.
+pub trait TrafficSource {
+    /// What can go wrong at this seam.
+    type Error: core::error::Error;
+    /// Moves the traffic to `now`, given the ego, and returns the scene at `now`.
+    ///
+    /// # Errors
+    /// When the source fails; the caller decides whether the run goes on.
+    fn advance(&mut self, now: Time, ego: &EgoState) -> Result<&Scene, Self::Error>;
+}
+
+/// One record of the loop.
+#[derive(Debug, Clone, Copy)]
+pub struct Tick<'a> {
+    /// Time of the tick.
+    pub now: Time,
+    /// Ego state used by the plan.
+    pub ego: &'a EgoState,
+    /// Scene used by the plan.
+    pub scene: &'a Scene,
+    /// The plan, its command included.
+    pub plan: &'a Plan,
+}
+
+/// Takes one record per tick. Recording never changes the run: `()` records nothing.
+pub trait Recorder {
+    /// Takes the record. A recorder keeps its own failure and reports it when it is finished.
+    fn record(&mut self, tick: &Tick<'_>);
+}
+
+impl Recorder for () {
+    fn record(&mut self, _tick: &Tick<'_>) {}
+}
+
+impl<A: Recorder, B: Recorder> Recorder for (A, B) {
+    fn record(&mut self, tick: &Tick<'_>) {
+        self.0.record(tick);
+        self.1.record(tick);
+    }
+}
+
+impl<R: Recorder + ?Sized> Recorder for &mut R {
+    fn record(&mut self, tick: &Tick<'_>) {
+        (**self).record(tick);
+    }
+}

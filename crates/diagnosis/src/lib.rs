@@ -1,0 +1,1 @@
+//! Measured drives to replay, residuals, named cause, extended truck, gain and report.

@@ -1,0 +1,1 @@
+//! The truck: a list of effects, an integrator and truck files.

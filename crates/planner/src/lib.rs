@@ -1,0 +1,1 @@
+//! Deciders, predictive cruise control, lane-change paths, safety gate, controllers, guard.

@@ -1,0 +1,1 @@
+//! Road geometry, lanes, grade, bank, curvature and limits from OpenDRIVE and CSV profiles.

@@ -1,0 +1,1 @@
+//! The closed loop without a server: SimTruck, World, scenarios.
