@@ -1,0 +1,59 @@
+//! Who may import whom: the drawing in ARCHITECTURE.md, checked against `cargo metadata`.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// For each crate of the workspace the crates of the workspace that it may link.
+fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
+    let plant = vec!["tractrix-core", "road", "dynamics", "planner", "traffic-client", "j1939"];
+    BTreeMap::from([
+        ("tractrix-core", vec![]),
+        ("road", vec!["tractrix-core"]),
+        ("dynamics", vec!["tractrix-core", "road"]),
+        ("planner", vec!["tractrix-core", "road"]),
+        ("traffic-client", vec!["tractrix-core", "road"]),
+        ("j1939", vec!["tractrix-core"]),
+        ("sim", plant.clone()),
+        ("diagnosis", vec!["tractrix-core", "road", "dynamics", "j1939"]),
+        ("truck-node", vec!["tractrix-core", "road", "planner", "j1939"]),
+        ("sim-server", [plant, vec!["sim", "diagnosis"]].concat()),
+    ])
+}
+
+/// Third-party crates that only one room may know.
+const ONLY: [(&str, &[&str]); 4] = [
+    ("tokio", &["sim-server"]),
+    ("axum", &["sim-server"]),
+    ("pyo3", &["tractrix-python"]),
+    ("clarabel", &["planner"]),
+];
+
+#[test]
+fn the_import_graph_is_the_one_of_architecture_md() {
+    let metadata = cargo_metadata::MetadataCommand::new().no_deps().exec().unwrap();
+    let members: BTreeSet<_> = metadata.packages.iter().map(|p| p.name.to_string()).collect();
+    let allowed = allowed();
+    let mut wrong = Vec::new();
+    for package in &metadata.packages {
+        let name = package.name.as_str();
+        if name == "tractrix-tests" {
+            continue;
+        }
+        let Some(may) = allowed.get(name) else {
+            wrong.push(format!("{name} is not in the drawing"));
+            continue;
+        };
+        for dependency in &package.dependencies {
+            if dependency.kind != cargo_metadata::DependencyKind::Normal {
+                continue;
+            }
+            let to = dependency.name.as_str();
+            if members.contains(to) && !may.contains(&to) {
+                wrong.push(format!("{name} imports {to}"));
+            }
+            if ONLY.iter().any(|(only, rooms)| *only == to && !rooms.contains(&name)) {
+                wrong.push(format!("{name} links {to}, which is another room's"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
