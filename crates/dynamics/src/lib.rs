@@ -1,1 +1,3 @@
 //! The truck: a list of effects, an integrator and truck files.
+
+pub mod lateral;

@@ -1,0 +1,427 @@
+//! Steering, kinematics and yaw-sideslip dynamics in one step, from standstill to the stability
+//! limit.
+//!
+//! Above [`BLEND_HIGH_M_S`] the truck moves as the 4-state model says, below [`BLEND_LOW_M_S`] as
+//! the kinematic one; between them their velocities are mixed with a smooth weight `w(v)`. The
+//! 4-state model runs all the time (below `BLEND_LOW_M_S` at that speed), the articulation and the
+//! pose integrate the mixed velocities, so that nothing jumps when the truck stops, starts or
+//! reverses.
+//!
+//! Integration: ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), an
+//! L-stable, linearly implicit method of order 2 that stays of order 2 with an approximate Jacobian;
+//! the Jacobian is the linear model's. Steps up to 10 ms are accurate to better than 1e-3 of the
+//! response; no step length or speed makes it unstable because of tyre stiffness.
+//!
+//! Left out: small-angle geometry is kept above the blend (articulation beyond 0.3 rad at speed is
+//! outside the model), and side forces do not move the kinematic model.
+
+use serde::{Deserialize, Serialize};
+
+use super::yaw_sideslip::{Force3, Loads};
+use super::{
+    AXLES, Kinematic, LateralError, LateralParameters, LoadTransfer, StateSpace,
+    SteeringParameters, SteeringState, YawSideslip,
+};
+
+/// Speed below which the motion is kinematic, m/s.
+pub const BLEND_LOW_M_S: f64 = 1.0;
+/// Speed above which the motion is that of the 4-state model, m/s.
+pub const BLEND_HIGH_M_S: f64 = 3.0;
+/// `1 - 1/sqrt(2)`: the method's parameter (L-stable).
+const ROS2: f64 = 1.0 - core::f64::consts::FRAC_1_SQRT_2;
+
+/// What the lateral model remembers. Position and heading are those of the reference point.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct LateralState {
+    /// Map x, m.
+    pub x_m: f64,
+    /// Map y, m.
+    pub y_m: f64,
+    /// Tractor heading, rad, not wrapped.
+    pub yaw_rad: f64,
+    /// Trailer heading minus tractor heading, rad.
+    pub articulation_rad: f64,
+    /// v_yc: lateral speed of the tractor's CG in the 4-state model, m/s. Below the blend
+    /// [`LateralModel::outputs`] has the true one.
+    pub cg_lateral_speed_m_s: f64,
+    /// omega_c of the 4-state model, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// omega_t of the 4-state model, rad/s.
+    pub trailer_yaw_rate_rad_s: f64,
+    /// Steering gear.
+    pub steering: SteeringState,
+}
+
+/// A side force at and a yaw moment about a body's CG.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct BodyForce {
+    /// Force along the body's y axis, N.
+    pub side_n: f64,
+    /// Yaw moment, Nm.
+    pub yaw_moment_nm: f64,
+}
+
+/// What acts on the truck during one step.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct LateralInputs {
+    /// Longitudinal speed, m/s; negative backwards.
+    pub speed_m_s: f64,
+    /// Its time derivative, m/s².
+    pub accel_x_m_s2: f64,
+    /// Demanded hand-wheel angle, rad, positive left.
+    pub steering_wheel_rad: f64,
+    /// Grade, rad, positive uphill.
+    pub grade_rad: f64,
+    /// Bank, rad, positive with the left side up.
+    pub bank_rad: f64,
+    /// Wind and other external loads on the tractor.
+    pub tractor: BodyForce,
+    /// Wind and other external loads on the trailer.
+    pub trailer: BodyForce,
+    /// Longitudinal tyre force per axle along its body, N, positive drives.
+    pub axle_longitudinal_force_n: [f64; AXLES],
+}
+
+/// What the model tells others.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct LateralOutputs {
+    /// Lateral speed of the reference point, m/s, body y.
+    pub lateral_speed_m_s: f64,
+    /// Lateral acceleration of the reference point, m/s², body y (no gravity).
+    pub accel_y_m_s2: f64,
+    /// Lateral acceleration of the tractor's CG, m/s².
+    pub tractor_accel_y_m_s2: f64,
+    /// Lateral acceleration of the trailer's CG in tractor axes, m/s².
+    pub trailer_accel_y_m_s2: f64,
+    /// Tractor yaw rate, rad/s.
+    pub yaw_rate_rad_s: f64,
+    /// Trailer yaw rate, rad/s.
+    pub trailer_yaw_rate_rad_s: f64,
+    /// Tractor yaw acceleration, rad/s².
+    pub yaw_accel_rad_s2: f64,
+    /// Trailer heading minus tractor heading, rad.
+    pub articulation_rad: f64,
+    /// Road-wheel angle, rad.
+    pub road_wheel_rad: f64,
+    /// Slip angle per axle, rad, positive when it gives a force to the left.
+    pub slip_rad: [f64; AXLES],
+    /// Side force per axle, N, to the left.
+    pub side_force_n: [f64; AXLES],
+    /// Lateral force of the trailer on the tractor at the hitch, N, along the tractor's y axis.
+    pub hitch_force_n: f64,
+    /// Load-transfer ratio; 1 = all load on the right wheels.
+    pub load_transfer_ratio: f64,
+}
+
+/// The lateral model of one truck in one loading state.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LateralModel {
+    yaw_sideslip: YawSideslip,
+    kinematic: Kinematic,
+    load_transfer: LoadTransfer,
+    steering: SteeringParameters,
+    max_articulation_rad: f64,
+}
+
+/// Velocities in use, after blending.
+#[derive(Clone, Copy)]
+struct Motion {
+    /// At the reference point.
+    lateral_speed_m_s: f64,
+    yaw_rate_rad_s: f64,
+    trailer_yaw_rate_rad_s: f64,
+}
+
+impl LateralState {
+    /// Straight and without lateral motion at a pose of the reference point: m, m, rad.
+    #[must_use]
+    pub fn at(x_m: f64, y_m: f64, yaw_rad: f64) -> Self {
+        Self { x_m, y_m, yaw_rad, ..Self::default() }
+    }
+}
+
+impl LateralModel {
+    /// Checks the parameters and precomputes loads, stiffnesses and effective lengths.
+    ///
+    /// # Errors
+    /// [`LateralError`] lists every violated bound.
+    pub fn new(parameters: &LateralParameters) -> Result<Self, LateralError> {
+        let violations = parameters.violations();
+        if !violations.is_empty() {
+            return Err(LateralError { violations });
+        }
+        let yaw_sideslip = YawSideslip::new(parameters);
+        Ok(Self {
+            kinematic: Kinematic::from_yaw_sideslip(&yaw_sideslip),
+            yaw_sideslip,
+            load_transfer: LoadTransfer::new(parameters),
+            steering: parameters.steering,
+            max_articulation_rad: parameters.max_articulation_rad,
+        })
+    }
+
+    /// The 4-state part.
+    #[must_use]
+    pub fn yaw_sideslip(&self) -> &YawSideslip {
+        &self.yaw_sideslip
+    }
+
+    /// The kinematic part.
+    #[must_use]
+    pub fn kinematic(&self) -> &Kinematic {
+        &self.kinematic
+    }
+
+    /// Load transfer.
+    #[must_use]
+    pub fn load_transfer(&self) -> &LoadTransfer {
+        &self.load_transfer
+    }
+
+    /// Steering gear.
+    #[must_use]
+    pub fn steering(&self) -> &SteeringParameters {
+        &self.steering
+    }
+
+    /// State matrix and input columns at speed `v` > 0, m/s (Eq. 10).
+    #[must_use]
+    pub fn state_matrix(&self, v: f64) -> StateSpace {
+        self.yaw_sideslip.state_space(v)
+    }
+
+    /// State after `dt_s` (up to 10 ms for full accuracy), inputs held.
+    #[must_use]
+    pub fn step(&self, state: &LateralState, inputs: &LateralInputs, dt_s: f64) -> LateralState {
+        let steering = self.steering.step(&state.steering, inputs.steering_wheel_rad, dt_s);
+        let deltas = [state.steering.road_wheel_rad, steering.road_wheel_rad];
+        let next = self.integrate(state, inputs, deltas, dt_s);
+        LateralState { steering, ..next }
+    }
+
+    /// One ROS2 step with the road-wheel angle at the start and at the end of the step.
+    #[inline]
+    fn integrate(
+        &self,
+        state: &LateralState,
+        inputs: &LateralInputs,
+        deltas: [f64; 2],
+        dt: f64,
+    ) -> LateralState {
+        let m = &self.yaw_sideslip;
+        let loads = self.loads(inputs);
+        let v = inputs.speed_m_s.max(BLEND_LOW_M_S);
+        let weight = blend(inputs.speed_m_s);
+        let s0 = [
+            state.cg_lateral_speed_m_s,
+            state.yaw_rate_rad_s,
+            state.trailer_yaw_rate_rad_s,
+            -state.articulation_rad,
+        ];
+        let solver = Solver::new(m, v, loads.specific_force_m_s2, ROS2 * dt, weight);
+        let rate = |s: &[f64; 4], delta: f64| {
+            let u = self.motion(inputs.speed_m_s, weight, s, delta);
+            (m.force(v, s, delta, &loads), u.yaw_rate_rad_s - u.trailer_yaw_rate_rad_s)
+        };
+        let (g, r) = rate(&s0, deltas[0]);
+        let k1 = solver.solve(g, r);
+        let s1: [f64; 4] = core::array::from_fn(|i| s0[i] + dt * k1[i]);
+        let (g, r) = rate(&s1, deltas[1]);
+        // The second stage solves with f - 2 k1, here premultiplied by H.
+        let hk = mass_times(m, &k1);
+        let k2 = solver.solve(core::array::from_fn(|i| g[i] - 2.0 * hk[i]), r - 2.0 * k1[3]);
+        let s: [f64; 4] = core::array::from_fn(|i| s0[i] + dt * (1.5 * k1[i] + 0.5 * k2[i]));
+        let s = self.stop(s);
+        self.move_pose(state, inputs.speed_m_s, weight, [&s0, &s], deltas, dt)
+    }
+
+    /// Articulation stop: clamps gamma and makes the bodies turn together if they fold further,
+    /// by the impulse moment of an inelastic hinge stop.
+    #[inline]
+    fn stop(&self, mut s: [f64; 4]) -> [f64; 4] {
+        if s[3].abs() > self.max_articulation_rad {
+            s[3] = s[3].clamp(-self.max_articulation_rad, self.max_articulation_rad);
+            let fold = s[1] - s[2];
+            if fold * s[3] > 0.0 {
+                let kick = self.yaw_sideslip.accelerations(&[0.0, -1.0, 1.0]);
+                let impulse = fold / (kick[2] - kick[1]);
+                for (value, k) in s.iter_mut().zip(kick) {
+                    *value += k * impulse;
+                }
+            }
+        }
+        s
+    }
+
+    /// Pose of the reference point by the midpoint of the velocities before and after.
+    #[inline]
+    fn move_pose(
+        &self,
+        state: &LateralState,
+        speed: f64,
+        weight: f64,
+        s: [&[f64; 4]; 2],
+        deltas: [f64; 2],
+        dt: f64,
+    ) -> LateralState {
+        let before = self.motion(speed, weight, s[0], deltas[0]);
+        let after = self.motion(speed, weight, s[1], deltas[1]);
+        let turn = 0.5 * dt * (before.yaw_rate_rad_s + after.yaw_rate_rad_s);
+        let lateral = 0.5 * (before.lateral_speed_m_s + after.lateral_speed_m_s);
+        let (sin, cos) = libm::sincos(state.yaw_rad + 0.5 * turn);
+        LateralState {
+            x_m: state.x_m + dt * (speed * cos - lateral * sin),
+            y_m: state.y_m + dt * (speed * sin + lateral * cos),
+            yaw_rad: state.yaw_rad + turn,
+            articulation_rad: -s[1][3],
+            cg_lateral_speed_m_s: s[1][0],
+            yaw_rate_rad_s: s[1][1],
+            trailer_yaw_rate_rad_s: s[1][2],
+            steering: state.steering,
+        }
+    }
+
+    /// Blended velocities.
+    #[inline]
+    fn motion(&self, speed: f64, weight: f64, s: &[f64; 4], delta: f64) -> Motion {
+        let dynamic = Motion {
+            lateral_speed_m_s: s[0] - self.yaw_sideslip.drive_group_behind_cg_m * s[1],
+            yaw_rate_rad_s: s[1],
+            trailer_yaw_rate_rad_s: s[2],
+        };
+        if weight >= 1.0 {
+            return dynamic;
+        }
+        let k = self.kinematic.velocity(speed, delta, -s[3]);
+        let mix = |d: f64, k: f64| k + weight * (d - k);
+        Motion {
+            lateral_speed_m_s: mix(dynamic.lateral_speed_m_s, k.lateral_speed_m_s),
+            yaw_rate_rad_s: mix(dynamic.yaw_rate_rad_s, k.yaw_rate_rad_s),
+            trailer_yaw_rate_rad_s: mix(dynamic.trailer_yaw_rate_rad_s, k.trailer_yaw_rate_rad_s),
+        }
+    }
+
+    fn loads(&self, inputs: &LateralInputs) -> Loads {
+        let m = &self.yaw_sideslip;
+        let bank = |mass| YawSideslip::bank_force_n(mass, inputs.bank_rad);
+        Loads {
+            tractor: [
+                inputs.tractor.side_n + bank(m.tractor_mass_kg),
+                inputs.tractor.yaw_moment_nm,
+            ],
+            trailer: [
+                inputs.trailer.side_n + bank(m.trailer_mass_kg),
+                inputs.trailer.yaw_moment_nm,
+            ],
+            specific_force_m_s2: inputs.accel_x_m_s2
+                + tractrix_core::GRAVITY_M_S2 * inputs.grade_rad,
+            longitudinal_n: inputs.axle_longitudinal_force_n,
+        }
+    }
+
+    /// What sensors and other effects want to know in this state under these inputs.
+    #[must_use]
+    pub fn outputs(&self, state: &LateralState, inputs: &LateralInputs) -> LateralOutputs {
+        let m = &self.yaw_sideslip;
+        let loads = self.loads(inputs);
+        let v = inputs.speed_m_s.max(BLEND_LOW_M_S);
+        let weight = blend(inputs.speed_m_s);
+        let delta = state.steering.road_wheel_rad;
+        let s = [
+            state.cg_lateral_speed_m_s,
+            state.yaw_rate_rad_s,
+            state.trailer_yaw_rate_rad_s,
+            -state.articulation_rad,
+        ];
+        let slip_rad = m.slip_rad(v, &s, delta);
+        let side_force_n = m.side_force_n(&slip_rad, &loads);
+        let [vy_dot, wc_dot, wt_dot] = m.accelerations(&m.force(v, &s, delta, &loads));
+        let u = self.motion(inputs.speed_m_s, weight, &s, delta);
+        // Below the blend the turn is taken as steady.
+        let turn = inputs.speed_m_s * u.yaw_rate_rad_s;
+        let tractor = turn + weight * vy_dot;
+        let trailer = tractor
+            - weight * (m.hitch_behind_cg_m * wc_dot + m.trailer_cg_behind_hitch_m * wt_dot);
+        let own = side_force_n[0]
+            + side_force_n[1]
+            + side_force_n[2]
+            + loads.longitudinal_n[0] * delta
+            + loads.tractor[0];
+        LateralOutputs {
+            lateral_speed_m_s: u.lateral_speed_m_s,
+            accel_y_m_s2: tractor - weight * m.drive_group_behind_cg_m * wc_dot,
+            tractor_accel_y_m_s2: tractor,
+            trailer_accel_y_m_s2: trailer,
+            yaw_rate_rad_s: u.yaw_rate_rad_s,
+            trailer_yaw_rate_rad_s: u.trailer_yaw_rate_rad_s,
+            yaw_accel_rad_s2: weight * wc_dot,
+            articulation_rad: state.articulation_rad,
+            road_wheel_rad: delta,
+            slip_rad,
+            side_force_n,
+            hitch_force_n: m.tractor_mass_kg * tractor - own,
+            load_transfer_ratio: self.load_transfer.ratio(tractor, trailer, inputs.bank_rad),
+        }
+    }
+}
+
+/// Weight of the 4-state model over speed: 0 below the blend, 1 above, smooth between.
+#[inline]
+fn blend(speed_m_s: f64) -> f64 {
+    let z = ((speed_m_s - BLEND_LOW_M_S) / (BLEND_HIGH_M_S - BLEND_LOW_M_S)).clamp(0.0, 1.0);
+    z * z * (3.0 - 2.0 * z)
+}
+
+/// First three rows of `H k`.
+#[inline]
+fn mass_times(m: &YawSideslip, k: &[f64; 4]) -> Force3 {
+    let h = m.mass_matrix();
+    core::array::from_fn(|i| h[i][0] * k[0] + h[i][1] * k[1] + h[i][2] * k[2])
+}
+
+/// Factors of `H - c A_h` with the articulation eliminated: `k_4 = r + c w (k_2 - k_3)`.
+struct Solver {
+    /// Triangular factors of the 3x3 system; reciprocal pivots on the diagonal.
+    lu: [[f64; 3]; 3],
+    /// `c` times the articulation column of A_h.
+    gamma: Force3,
+    cw: f64,
+}
+
+impl Solver {
+    #[inline]
+    fn new(m: &YawSideslip, v: f64, specific_force: f64, c: f64, weight: f64) -> Self {
+        let (h, j) = (m.mass_matrix(), m.force_jacobian(v, specific_force));
+        let cw = c * weight;
+        let gamma: Force3 = core::array::from_fn(|i| c * j[i][3]);
+        let mut a: [[f64; 3]; 3] =
+            core::array::from_fn(|i| core::array::from_fn(|k| h[i][k] - c * j[i][k]));
+        for (row, g) in a.iter_mut().zip(gamma) {
+            row[1] -= cw * g;
+            row[2] += cw * g;
+        }
+        // The symmetric part is positive definite (mass and tyre damping): no pivoting needed.
+        a[0][0] = 1.0 / a[0][0];
+        for i in 1..3 {
+            a[i][0] *= a[0][0];
+            a[i][1] -= a[i][0] * a[0][1];
+            a[i][2] -= a[i][0] * a[0][2];
+        }
+        a[1][1] = 1.0 / a[1][1];
+        a[2][1] *= a[1][1];
+        a[2][2] = 1.0 / (a[2][2] - a[2][1] * a[1][2]);
+        Self { lu: a, gamma, cw }
+    }
+
+    #[inline]
+    fn solve(&self, g: Force3, r: f64) -> [f64; 4] {
+        let a = &self.lu;
+        let b: Force3 = core::array::from_fn(|i| g[i] + self.gamma[i] * r);
+        let y1 = b[1] - a[1][0] * b[0];
+        let y2 = b[2] - a[2][0] * b[0] - a[2][1] * y1;
+        let z = y2 * a[2][2];
+        let y = (y1 - a[1][2] * z) * a[1][1];
+        let x = (b[0] - a[0][1] * y - a[0][2] * z) * a[0][0];
+        [x, y, z, r + self.cw * (y - z)]
+    }
+}

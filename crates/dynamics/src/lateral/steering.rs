@@ -1,0 +1,133 @@
+//! From the hand wheel to the road wheels.
+//!
+//! Order of the parts: angle and rate limit of the hand wheel, free play (backlash) of the steering
+//! gear, offset, ratio, first-order lag. The lag is integrated exactly.
+//!
+//! Left out: steering compliance under aligning moment, left-right (Ackermann) difference.
+
+use serde::{Deserialize, Serialize};
+
+/// Steering gear.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SteeringParameters {
+    /// Hand-wheel angle per road-wheel angle.
+    pub ratio: f64,
+    /// Time constant of the first-order lag, s; 0 for none.
+    pub lag_s: f64,
+    /// Hand-wheel angle through which the road wheels do not move on reversal, rad, lock to lock of
+    /// the play.
+    pub free_play_rad: f64,
+    /// Hand-wheel angle that must be added to the true one to drive straight, rad: the wheels stand
+    /// at `(hand wheel - offset) / ratio`.
+    pub offset_rad: f64,
+    /// Largest hand-wheel angle, rad.
+    pub max_wheel_rad: f64,
+    /// Largest hand-wheel rate, rad/s.
+    pub max_wheel_rate_rad_s: f64,
+}
+
+/// State of the steering gear.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct SteeringState {
+    /// Hand-wheel angle after its limits, rad, positive left.
+    pub wheel_rad: f64,
+    /// Hand-wheel side of the steering gear behind the free play, rad.
+    pub gear_rad: f64,
+    /// Road-wheel angle, rad, positive left.
+    pub road_wheel_rad: f64,
+}
+
+impl SteeringParameters {
+    pub(super) fn check(&self, check: &mut impl FnMut(&str, f64, f64, f64)) {
+        check("steering.ratio", self.ratio, 1.0, 60.0);
+        check("steering.lag_s", self.lag_s, 0.0, 5.0);
+        check("steering.free_play_rad", self.free_play_rad, 0.0, 1.0);
+        check("steering.offset_rad", self.offset_rad, -2.0, 2.0);
+        check("steering.max_wheel_rad", self.max_wheel_rad, 0.1, 40.0);
+        check("steering.max_wheel_rate_rad_s", self.max_wheel_rate_rad_s, 0.1, 1e3);
+    }
+
+    /// State after `dt_s` with the demanded hand-wheel angle, rad.
+    #[must_use]
+    pub fn step(&self, state: &SteeringState, wheel_demand_rad: f64, dt_s: f64) -> SteeringState {
+        let reach = self.max_wheel_rate_rad_s * dt_s;
+        let demand = wheel_demand_rad.clamp(-self.max_wheel_rad, self.max_wheel_rad);
+        let wheel = demand.clamp(state.wheel_rad - reach, state.wheel_rad + reach);
+        let play = 0.5 * self.free_play_rad;
+        let gear = state.gear_rad.clamp(wheel - play, wheel + play);
+        let target = (gear - self.offset_rad) / self.ratio;
+        let keep = if self.lag_s > 0.0 { libm::exp(-dt_s / self.lag_s) } else { 0.0 };
+        SteeringState {
+            wheel_rad: wheel,
+            gear_rad: gear,
+            road_wheel_rad: target + keep * (state.road_wheel_rad - target),
+        }
+    }
+
+    /// Hand-wheel angle, rad, that holds this road-wheel angle, rad (free play at its middle).
+    #[must_use]
+    pub fn wheel_for_rad(&self, road_wheel_rad: f64) -> f64 {
+        road_wheel_rad * self.ratio + self.offset_rad
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gear() -> SteeringParameters {
+        SteeringParameters {
+            ratio: 20.0,
+            lag_s: 0.08,
+            free_play_rad: 0.1,
+            offset_rad: 0.0,
+            max_wheel_rad: 10.0,
+            max_wheel_rate_rad_s: 1e3,
+        }
+    }
+
+    #[test]
+    fn the_lag_is_exact_whatever_the_step_length() {
+        let p = SteeringParameters { free_play_rad: 0.0, ..gear() };
+        let run = |n: usize| {
+            let mut s = SteeringState::default();
+            for _ in 0..n {
+                s = p.step(&s, 1.0, 0.16 / n as f64);
+            }
+            s.road_wheel_rad
+        };
+        let exact = (1.0 - (-2.0_f64).exp()) / 20.0;
+        assert!((run(1) - exact).abs() < 1e-15);
+        assert!((run(160) - exact).abs() < 1e-15);
+    }
+
+    #[test]
+    fn free_play_loses_its_width_on_reversal_and_half_of_it_from_the_middle() {
+        let p = SteeringParameters { lag_s: 0.0, ..gear() };
+        let left = p.step(&SteeringState::default(), 1.0, 0.1);
+        assert!((left.road_wheel_rad - 0.95 / 20.0).abs() < 1e-15);
+        let within = p.step(&left, 0.91, 0.1);
+        assert_eq!(within.road_wheel_rad, left.road_wheel_rad);
+        let back = p.step(&within, 0.8, 0.1);
+        assert!((back.road_wheel_rad - 0.85 / 20.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn angle_and_rate_are_limited_and_the_offset_is_taken_off() {
+        let p = SteeringParameters {
+            lag_s: 0.0,
+            free_play_rad: 0.0,
+            offset_rad: 0.2,
+            max_wheel_rad: 2.0,
+            max_wheel_rate_rad_s: 4.0,
+            ..gear()
+        };
+        let s = p.step(&SteeringState::default(), 9.0, 0.25);
+        assert!((s.wheel_rad - 1.0).abs() < 1e-15);
+        let s = p.step(&p.step(&s, 9.0, 0.25), 9.0, 0.25);
+        assert!((s.wheel_rad - 2.0).abs() < 1e-15);
+        assert!((s.road_wheel_rad - 1.8 / 20.0).abs() < 1e-15);
+        assert!((p.wheel_for_rad(s.road_wheel_rad) - 2.0).abs() < 1e-12);
+    }
+}

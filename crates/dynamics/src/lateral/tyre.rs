@@ -1,0 +1,146 @@
+//! Side force of an axle over its slip angle.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | C | cornering stiffness of an axle, N/rad, all its tyres |
+//! | F_z | vertical load of the axle, N; F_z,tyre per tyre |
+//! | alpha | slip angle, rad, positive when it gives a force to the left |
+//! | mu | friction coefficient |
+//!
+//! `C = c F_z (1 - k (F_z,tyre / F_rated - 1))`: stiffness grows less than load. Saturation is the
+//! brush model (Fiala; Pacejka, "Tire and Vehicle Dynamics", 3rd ed., sect. 3.2). Under a
+//! longitudinal force the side force that is left follows the friction ellipse.
+//!
+//! Left out: camber, aligning moment, relaxation length, speed-dependent friction.
+
+use serde::{Deserialize, Serialize};
+
+use super::AXLES;
+
+/// Tyres of all axles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TyreParameters {
+    /// Cornering stiffness per load at the rated load, 1/rad.
+    pub cornering_coeff_per_rad: f64,
+    /// Relative loss of that coefficient per relative load above the rated one.
+    pub load_degression_frac: f64,
+    /// Rated load of one tyre, N.
+    pub rated_load_n: f64,
+    /// Tyres on the steer axle, on each drive axle, on each trailer axle.
+    pub tyres_per_axle: [f64; 3],
+    /// Factor on the cornering stiffness of the steer axle, each drive axle, each trailer axle.
+    pub stiffness_scale: [f64; 3],
+    /// Measured cornering stiffness per axle, N/rad, instead of the load formula.
+    #[serde(default)]
+    pub axle_stiffness_n_rad: Option<[f64; AXLES]>,
+    /// Linear or saturating.
+    pub law: TyreLaw,
+}
+
+/// How side force grows with slip angle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum TyreLaw {
+    /// `F = C alpha`, without bound (the paper's model).
+    Linear,
+    /// Brush model with the friction coefficient `friction_coeff`, reduced by longitudinal force.
+    Saturating {
+        /// Friction coefficient mu of the road.
+        friction_coeff: f64,
+    },
+}
+
+/// Group of an axle: 0 steer, 1 drive, 2 trailer.
+pub(super) const GROUP: [usize; AXLES] = [0, 1, 1, 2, 2, 2];
+
+impl TyreParameters {
+    pub(super) fn check(&self, check: &mut impl FnMut(&str, f64, f64, f64)) {
+        check("tyres.cornering_coeff_per_rad", self.cornering_coeff_per_rad, 0.0, 50.0);
+        check("tyres.load_degression_frac", self.load_degression_frac, 0.0, 0.9);
+        check("tyres.rated_load_n", self.rated_load_n, 1e3, 1e5);
+        for n in self.tyres_per_axle {
+            check("tyres.tyres_per_axle", n, 1.0, 8.0);
+        }
+        for k in self.stiffness_scale {
+            check("tyres.stiffness_scale", k, 0.0, 10.0);
+        }
+        for c in self.axle_stiffness_n_rad.into_iter().flatten() {
+            check("tyres.axle_stiffness_n_rad", c, 0.0, 1e8);
+        }
+        if let TyreLaw::Saturating { friction_coeff } = self.law {
+            check("tyres.law.saturating.friction_coeff", friction_coeff, 0.01, 2.0);
+        }
+    }
+
+    /// Cornering stiffness per axle, N/rad, for these axle loads.
+    #[must_use]
+    pub fn stiffness_n_rad(&self, axle_load_n: &[f64; AXLES]) -> [f64; AXLES] {
+        core::array::from_fn(|axle| {
+            let group = GROUP[axle];
+            let stiffness = match self.axle_stiffness_n_rad {
+                Some(measured) => measured[axle],
+                None => {
+                    let load = axle_load_n[axle];
+                    let tyre = load / self.tyres_per_axle[group];
+                    let factor = 1.0 - self.load_degression_frac * (tyre / self.rated_load_n - 1.0);
+                    self.cornering_coeff_per_rad * load * factor.max(0.1)
+                }
+            };
+            stiffness * self.stiffness_scale[group]
+        })
+    }
+}
+
+impl TyreLaw {
+    /// Side force of an axle, N: stiffness, N/rad; load, N; longitudinal force, N; slip angle, rad.
+    #[inline]
+    #[must_use]
+    pub fn side_force_n(
+        self,
+        stiffness_n_rad: f64,
+        load_n: f64,
+        longitudinal_force_n: f64,
+        slip_rad: f64,
+    ) -> f64 {
+        match self {
+            Self::Linear => stiffness_n_rad * slip_rad,
+            Self::Saturating { friction_coeff } => {
+                let limit = friction_coeff * load_n.max(1.0);
+                let used = (longitudinal_force_n / limit).clamp(-0.99, 0.99);
+                let left = libm::sqrt(1.0 - used * used);
+                brush(stiffness_n_rad * left, limit * left, slip_rad)
+            }
+        }
+    }
+}
+
+/// Brush model: `F = F_max (3 z - 3 z|z| + z³)` with `z = C alpha / (3 F_max)`, full sliding at
+/// `|z| = 1`.
+#[inline]
+fn brush(stiffness: f64, limit: f64, slip: f64) -> f64 {
+    let z = (stiffness * slip / (3.0 * limit)).clamp(-1.0, 1.0);
+    limit * z * (3.0 - 3.0 * z.abs() + z * z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_brush_model_starts_with_the_cornering_stiffness_and_ends_at_the_friction_limit() {
+        let law = TyreLaw::Saturating { friction_coeff: 0.8 };
+        let slope = law.side_force_n(4e5, 6e4, 0.0, 1e-6) / 1e-6;
+        assert!((slope / 4e5 - 1.0).abs() < 1e-5);
+        assert!((law.side_force_n(4e5, 6e4, 0.0, 1.0) - 0.8 * 6e4).abs() < 1e-9);
+        assert_eq!(law.side_force_n(4e5, 6e4, 0.0, -0.05), -law.side_force_n(4e5, 6e4, 0.0, 0.05));
+    }
+
+    #[test]
+    fn braking_takes_side_force_along_the_friction_ellipse() {
+        let law = TyreLaw::Saturating { friction_coeff: 0.5 };
+        let (fx, fz): (f64, f64) = (-3e4, 1e5);
+        let fy = law.side_force_n(6e5, fz, fx, 1.0);
+        assert!(((fx * fx + fy * fy).sqrt() / (0.5 * fz) - 1.0).abs() < 1e-12);
+    }
+}
