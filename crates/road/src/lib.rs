@@ -1,1 +1,20 @@
-//! Road geometry, lanes, grade, bank, curvature and limits from OpenDRIVE and CSV profiles.
+//! Road geometry, lanes, grade, bank, curvature and limits.
+//!
+//! A [`Road`] is one carriageway as the ego drives it: station `s` in metres along the reference
+//! line, offset `d` to the left of it. Grade is positive uphill, bank positive with the left side
+//! up, curvature positive to the left, headings counter-clockwise from map x.
+#![cfg_attr(not(feature = "std"), no_std)]
+extern crate alloc;
+
+pub mod builtin;
+#[cfg(feature = "std")]
+mod csv_profile;
+mod error;
+mod lane;
+mod line;
+mod road;
+
+pub use error::RoadError;
+pub use lane::{LaneEnd, LaneKind, LaneTrack};
+pub use line::{Knot, Line};
+pub use road::{ProfilePoint, Road, RoadPoint, RoadPosition};

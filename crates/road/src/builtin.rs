@@ -1,0 +1,217 @@
+//! Built-in roads: a real hilly highway, a synthetic test site, a flat straight.
+
+use alloc::{vec, vec::Vec};
+
+use tractrix_core::Curve;
+
+use crate::road::parallel_lanes;
+use crate::{LaneEnd, LaneKind, LaneTrack, Line, Road};
+
+/// Grades of a hilly stretch of a real long-haul drive; origin and licence in the file's head.
+const HILLS: &str = include_str!("../data/longhaul_hills.csv");
+
+const LANE_WIDTH_M: f64 = 3.75;
+const LENGTH_M: f64 = 15_000.0;
+
+/// 15 km of highway: real grades, curves down to R = 600 m, two to three lanes, an on-ramp at
+/// 3 km and an off-ramp at 11 km.
+///
+/// The reference line is the right edge of the left through lane. Lanes: 0 right, 1 left, 2 a
+/// climbing stretch's third lane on the left, 3 the on-ramp, 4 the off-ramp.
+#[must_use]
+pub fn highway() -> Road {
+    let grades = hills();
+    let curves = PlanView::new(&HIGHWAY_CURVES);
+    let line = Line::integrate(
+        LENGTH_M,
+        0.0,
+        |s| curves.at(s),
+        |s| grades.at(s),
+        |s| bank_rad(curves.at(s)),
+    );
+    let w = LANE_WIDTH_M;
+    let lane = |id, from, to, kind, end, center: Curve| LaneTrack {
+        id,
+        s_start_m: from,
+        s_end_m: to,
+        kind,
+        end,
+        center,
+        width: Curve::constant(w),
+        speed_limit: None,
+    };
+    let through =
+        |id, d| lane(id, 0.0, LENGTH_M, LaneKind::Driving, LaneEnd::Continues, Curve::constant(d));
+    let ramp = |points: &[(f64, f64)]| curve(points);
+    let lanes = vec![
+        through(0, -0.5 * w),
+        through(1, 0.5 * w),
+        lane(2, 6_000.0, 8_500.0, LaneKind::Driving, LaneEnd::Drops, Curve::constant(1.5 * w)),
+        lane(
+            3,
+            2_700.0,
+            3_350.0,
+            LaneKind::Entry,
+            LaneEnd::Drops,
+            ramp(&[(2_700.0, -3.6 * w), (3_000.0, -1.5 * w), (3_350.0, -1.5 * w)]),
+        ),
+        lane(
+            4,
+            11_000.0,
+            11_550.0,
+            LaneKind::Exit,
+            LaneEnd::Leaves,
+            ramp(&[(11_000.0, -1.5 * w), (11_250.0, -1.5 * w), (11_550.0, -3.6 * w)]),
+        ),
+    ];
+    let limits = vec![(0.0, 25.0), (9_000.0, 22.22), (10_000.0, 25.0)];
+    expect_valid(Road::new("highway", line, lanes, limits))
+}
+
+/// 15 km with the statistics of the paper's site: grades to ±5 % with a standard deviation of
+/// 2.8 %, 225 m of climb, R = 600 m curves, two lanes. Heights are a sum of sines with fixed
+/// coefficients, limited to ±5 %.
+#[must_use]
+pub fn test_site() -> Road {
+    let curves = PlanView::new(&SITE_CURVES);
+    let slope = |s: f64| {
+        let wave =
+            |period_m: f64, phase: f64| libm::sin(core::f64::consts::TAU * s / period_m + phase);
+        0.005
+            + 1.06
+                * (0.0325 * wave(2_500.0, 0.3)
+                    + 0.017 * wave(1_150.0, 1.9)
+                    + 0.008 * wave(610.0, 4.0))
+    };
+    let limited = |s: f64| slope(s).clamp(-0.05, 0.05);
+    let line =
+        Line::integrate(LENGTH_M, 0.0, |s| curves.at(s), limited, |s| bank_rad(curves.at(s)));
+    let lanes = parallel_lanes(2, LANE_WIDTH_M, LENGTH_M);
+    expect_valid(Road::new("test-site", line, lanes, vec![(0.0, 25.0)]))
+}
+
+/// Level, straight, two lanes, 25 m/s.
+#[must_use]
+pub fn flat(length_m: f64) -> Road {
+    let length_m = if length_m.is_finite() { length_m.clamp(1.0, 1e7) } else { LENGTH_M };
+    let line = Line::integrate(length_m, 0.0, |_| 0.0, |_| 0.0, |_| 0.0);
+    let lanes = parallel_lanes(2, LANE_WIDTH_M, length_m);
+    expect_valid(Road::new("flat", line, lanes, vec![(0.0, 25.0)]))
+}
+
+/// Curves as (start of the entry clothoid m, clothoid m, arc m, curvature 1/m).
+const HIGHWAY_CURVES: [(f64, f64, f64, f64); 9] = [
+    (600.0, 150.0, 500.0, 1.0 / 1_500.0),
+    (1_900.0, 150.0, 350.0, -1.0 / 900.0),
+    (3_700.0, 200.0, 450.0, 1.0 / 1_200.0),
+    (5_000.0, 150.0, 400.0, -1.0 / 750.0),
+    (6_400.0, 200.0, 700.0, 1.0 / 2_000.0),
+    (8_900.0, 160.0, 300.0, 1.0 / 600.0),
+    (9_700.0, 160.0, 300.0, -1.0 / 600.0),
+    (11_700.0, 200.0, 600.0, -1.0 / 1_500.0),
+    (13_300.0, 150.0, 500.0, 1.0 / 800.0),
+];
+
+const SITE_CURVES: [(f64, f64, f64, f64); 6] = [
+    (900.0, 150.0, 400.0, 1.0 / 800.0),
+    (2_600.0, 150.0, 350.0, -1.0 / 600.0),
+    (5_200.0, 200.0, 500.0, -1.0 / 1_200.0),
+    (7_600.0, 150.0, 300.0, 1.0 / 600.0),
+    (10_100.0, 200.0, 700.0, 1.0 / 1_500.0),
+    (12_900.0, 150.0, 400.0, -1.0 / 700.0),
+];
+
+/// Curvature of a chain of clothoid-arc-clothoid curves between straights.
+struct PlanView(Curve);
+
+impl PlanView {
+    fn new(curves: &[(f64, f64, f64, f64)]) -> Self {
+        let mut points = vec![(0.0, 0.0)];
+        for &(s, clothoid, arc, kappa) in curves {
+            points.extend([
+                (s, 0.0),
+                (s + clothoid, kappa),
+                (s + clothoid + arc, kappa),
+                (s + 2.0 * clothoid + arc, 0.0),
+            ]);
+        }
+        Self(curve(&points))
+    }
+
+    fn at(&self, s_m: f64) -> f64 {
+        self.0.at(s_m)
+    }
+}
+
+/// Bank that carries a third of the lateral acceleration at 80 km/h, at most 5 %; a left curve
+/// lifts the right side.
+fn bank_rad(curvature_1_m: f64) -> f64 {
+    -(22.2 * 22.2 * curvature_1_m / (3.0 * tractrix_core::GRAVITY_M_S2)).clamp(-0.05, 0.05)
+}
+
+fn hills() -> Curve {
+    let points: Vec<(f64, f64)> = HILLS
+        .lines()
+        .filter_map(|line| line.split_once(','))
+        .filter_map(|(s, g)| Some((s.parse().ok()?, g.parse().ok()?)))
+        .collect();
+    curve(&points)
+}
+
+/// A curve from literal points; the tables above are checked by the tests of this file.
+fn curve(points: &[(f64, f64)]) -> Curve {
+    let (x, y) = points.iter().copied().unzip();
+    Curve::new("built-in", x, y).unwrap_or_else(|_| Curve::constant(0.0))
+}
+
+#[expect(clippy::expect_used, reason = "built-in tables; the tests of this file build each")]
+fn expect_valid(road: Result<Road, crate::RoadError>) -> Road {
+    road.expect("built-in road")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_test_site_has_the_statistics_of_the_papers_site() {
+        let road = test_site();
+        let grades: Vec<f64> =
+            (0..1_500).map(|i| road.line().at(f64::from(i) * 10.0).slope).collect();
+        let n = grades.len() as f64;
+        let mean = grades.iter().sum::<f64>() / n;
+        let std = (grades.iter().map(|g| (g - mean) * (g - mean)).sum::<f64>() / n).sqrt();
+        let climb: f64 = grades.iter().map(|g| g.max(0.0) * 10.0).sum();
+        let steepest = grades.iter().fold(0.0_f64, |a, g| a.max(g.abs()));
+        assert!((steepest - 0.05).abs() < 1e-3, "steepest {steepest}");
+        assert!((std - 0.028).abs() < 0.001, "std {std}");
+        assert!((climb - 225.0).abs() < 5.0, "climb {climb}");
+    }
+
+    #[test]
+    fn the_highway_is_15_km_of_real_hills_with_curves_down_to_600_m() {
+        let road = highway();
+        assert_eq!(road.length_m(), 15_000.0);
+        let tightest = (0..15_000)
+            .map(|i| road.line().at(f64::from(i)).curvature_1_m.abs())
+            .fold(0.0, f64::max);
+        assert!((tightest - 1.0 / 600.0).abs() < 1e-9);
+        assert_eq!(road.lanes_at(7_000.0).count(), 3);
+        assert_eq!(road.left_of(0, 100.0), Some(1));
+        assert_eq!(road.left_of(1, 100.0), None);
+        assert_eq!(road.left_of(3, 3_100.0), Some(0));
+    }
+
+    #[test]
+    fn projection_inverts_the_map() {
+        let road = highway();
+        for i in 0..300 {
+            let (s, d) = (37.0 + 49.7 * f64::from(i), -4.0 + 0.03 * f64::from(i));
+            let p = road.at(s, d);
+            for hint in [Some(s + 3.0), None] {
+                let back = road.project(p.x_m, p.y_m, hint).unwrap();
+                assert!((back.s_m - s).abs() < 1e-6 && (back.d_m - d).abs() < 1e-6, "{s} {d}");
+            }
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! What can be wrong with a road.
+
+use alloc::string::String;
+
+/// Errors of reading or building a road. Messages name the file, element, line or column.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RoadError {
+    /// A file could not be read.
+    #[error("{path}: {why}")]
+    Io {
+        /// The file.
+        path: String,
+        /// Why.
+        why: String,
+    },
+    /// A table row or column cannot be used.
+    #[error("{path}: line {line}: {why}")]
+    Table {
+        /// The file.
+        path: String,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong, with column and value.
+        why: String,
+    },
+    /// The geometry does not make a road.
+    #[error("road {name}: {why}")]
+    Invalid {
+        /// Name of the road.
+        name: String,
+        /// What is wrong.
+        why: String,
+    },
+    /// The name or extension is not known.
+    #[error(
+        "{name}: a road is a .xodr or .csv file, builtin:highway, builtin:test-site or builtin:flat"
+    )]
+    UnknownRoad {
+        /// What was asked for.
+        name: String,
+    },
+}

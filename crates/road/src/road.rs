@@ -1,0 +1,237 @@
+//! The road that the stack drives: reference line, lane tracks, limits.
+
+use alloc::{string::String, vec::Vec};
+
+use tractrix_core::Curve;
+
+use crate::{LaneKind, LaneTrack, Line, RoadError};
+
+/// A point on the road surface.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RoadPoint {
+    /// Map x, m.
+    pub x_m: f64,
+    /// Map y, m.
+    pub y_m: f64,
+    /// Map z, m (bank included).
+    pub z_m: f64,
+    /// Heading of the reference line, rad.
+    pub heading_rad: f64,
+    /// Curvature of the reference line, 1/m, positive left.
+    pub curvature_1_m: f64,
+    /// Grade, rad, positive uphill.
+    pub grade_rad: f64,
+    /// Bank, rad, left side up.
+    pub bank_rad: f64,
+}
+
+/// A position in road coordinates.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RoadPosition {
+    /// Station, m.
+    pub s_m: f64,
+    /// Offset, m, positive left.
+    pub d_m: f64,
+}
+
+/// One sample of the look-ahead profile.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ProfilePoint {
+    /// Station, m.
+    pub s_m: f64,
+    /// Height, m.
+    pub z_m: f64,
+    /// Grade, rad.
+    pub grade_rad: f64,
+    /// Curvature, 1/m.
+    pub curvature_1_m: f64,
+    /// Bank, rad.
+    pub bank_rad: f64,
+    /// Speed limit, m/s.
+    pub speed_limit_m_s: f64,
+}
+
+/// One carriageway as the ego drives it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Road {
+    name: String,
+    line: Line,
+    lanes: Vec<LaneTrack>,
+    limits: Vec<(f64, f64)>,
+}
+
+impl Road {
+    /// A road from its parts. `limits` are (from station m, limit m/s) in order, the first at 0.
+    ///
+    /// # Errors
+    /// [`RoadError::Invalid`] if there is no lane, a lane's index is not its position, or the
+    /// limits are out of order.
+    pub fn new(
+        name: &str,
+        line: Line,
+        lanes: Vec<LaneTrack>,
+        limits: Vec<(f64, f64)>,
+    ) -> Result<Self, RoadError> {
+        let bad = |why: &str| RoadError::Invalid { name: name.into(), why: why.into() };
+        if lanes.is_empty() || lanes.len() > usize::from(u16::MAX) {
+            return Err(bad("needs 1 to 65535 lanes"));
+        }
+        if lanes.iter().enumerate().any(|(i, l)| usize::from(l.id) != i) {
+            return Err(bad("a lane's id must be its index"));
+        }
+        let ordered = limits.windows(2).all(|w| w[1].0 > w[0].0);
+        if limits.is_empty() || !ordered || limits.iter().any(|l| !(l.1 > 0.0)) {
+            return Err(bad("speed limits must be positive and in order of station"));
+        }
+        Ok(Self { name: name.into(), line, lanes, limits })
+    }
+
+    /// Name of the road.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Length, m.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        self.line.length_m()
+    }
+
+    /// The reference line.
+    #[must_use]
+    pub const fn line(&self) -> &Line {
+        &self.line
+    }
+
+    /// The surface at (s, d); s is clamped to the road.
+    #[must_use]
+    pub fn at(&self, s_m: f64, d_m: f64) -> RoadPoint {
+        let k = self.line.at(s_m);
+        let (sin, cos) = libm::sincos(k.heading_rad);
+        let (sin_bank, cos_bank) = libm::sincos(k.bank_rad);
+        RoadPoint {
+            x_m: k.x_m - d_m * cos_bank * sin,
+            y_m: k.y_m + d_m * cos_bank * cos,
+            z_m: k.z_m + d_m * sin_bank,
+            heading_rad: k.heading_rad,
+            curvature_1_m: k.curvature_1_m,
+            grade_rad: libm::atan(k.slope),
+            bank_rad: k.bank_rad,
+        }
+    }
+
+    /// Road coordinates of a map point; fast near a hint. `None` for a non-finite point.
+    #[must_use]
+    pub fn project(&self, x_m: f64, y_m: f64, hint_s_m: Option<f64>) -> Option<RoadPosition> {
+        let (s_m, flat) = self.line.project(x_m, y_m, hint_s_m)?;
+        Some(RoadPosition { s_m, d_m: flat / libm::cos(self.line.at(s_m).bank_rad) })
+    }
+
+    /// All lane tracks; the index is the id.
+    #[must_use]
+    pub fn lanes(&self) -> &[LaneTrack] {
+        &self.lanes
+    }
+
+    /// Lanes that exist at a station, in order of their ids.
+    pub fn lanes_at(&self, s_m: f64) -> impl Iterator<Item = &LaneTrack> {
+        self.lanes.iter().filter(move |l| l.exists_at(s_m))
+    }
+
+    /// The lane that holds the point (s, d), shoulders included; the nearest centre wins.
+    #[must_use]
+    pub fn lane_at(&self, s_m: f64, d_m: f64) -> Option<u16> {
+        self.lanes_at(s_m)
+            .map(|l| (l.id, (l.center_d_m(s_m) - d_m).abs(), 0.5 * l.width_m(s_m)))
+            .filter(|(_, off, half)| off <= half)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(id, ..)| id)
+    }
+
+    /// The drivable lane touching this one on the left at a station.
+    #[must_use]
+    pub fn left_of(&self, lane: u16, s_m: f64) -> Option<u16> {
+        self.beside(lane, s_m, 1.0)
+    }
+
+    /// The drivable lane touching this one on the right at a station.
+    #[must_use]
+    pub fn right_of(&self, lane: u16, s_m: f64) -> Option<u16> {
+        self.beside(lane, s_m, -1.0)
+    }
+
+    fn beside(&self, lane: u16, s_m: f64, side: f64) -> Option<u16> {
+        let own = self.lanes.get(usize::from(lane))?;
+        let (d, w) = (own.center_d_m(s_m), own.width_m(s_m));
+        self.lanes_at(s_m)
+            .filter(|l| l.id != lane && l.kind != LaneKind::Shoulder)
+            .map(|l| (l.id, side * (l.center_d_m(s_m) - d), 0.5 * (w + l.width_m(s_m))))
+            .filter(|(_, off, reach)| *off > 0.5 && *off < reach + 0.5)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(id, ..)| id)
+    }
+
+    /// Speed limit of the road, m/s.
+    #[must_use]
+    pub fn speed_limit_m_s(&self, s_m: f64) -> f64 {
+        let i = self.limits.partition_point(|l| l.0 <= s_m);
+        self.limits[i.max(1) - 1].1
+    }
+
+    /// Speed limit of a lane, m/s: its own if it has one.
+    #[must_use]
+    pub fn lane_speed_limit_m_s(&self, lane: u16, s_m: f64) -> f64 {
+        self.lanes
+            .get(usize::from(lane))
+            .and_then(|l| l.speed_limit.as_ref())
+            .map_or_else(|| self.speed_limit_m_s(s_m), |c| c.at(s_m))
+    }
+
+    /// Fills `out` with the profile from `s0_m` on, `step_m` apart; clamped at the end.
+    pub fn profile(&self, s0_m: f64, step_m: f64, out: &mut [ProfilePoint]) {
+        for (i, p) in out.iter_mut().enumerate() {
+            let k = self.line.at(s0_m + i as f64 * step_m);
+            *p = ProfilePoint {
+                s_m: k.s_m,
+                z_m: k.z_m,
+                grade_rad: libm::atan(k.slope),
+                curvature_1_m: k.curvature_1_m,
+                bank_rad: k.bank_rad,
+                speed_limit_m_s: self.speed_limit_m_s(k.s_m),
+            };
+        }
+    }
+
+    /// Reads a road by file or built-in name.
+    ///
+    /// # Errors
+    /// [`RoadError`] names the file, line and value.
+    #[cfg(feature = "std")]
+    pub fn load(name: &str) -> Result<Self, RoadError> {
+        match name {
+            "builtin:highway" => Ok(crate::builtin::highway()),
+            "builtin:test-site" => Ok(crate::builtin::test_site()),
+            "builtin:flat" => Ok(crate::builtin::flat(15_000.0)),
+            _ if name.ends_with(".csv") => crate::csv_profile::read(name),
+            _ => Err(RoadError::UnknownRoad { name: name.into() }),
+        }
+    }
+}
+
+/// Lane tracks of equal width along a whole road, rightmost first, the reference line between the
+/// first two (or in the middle of one).
+pub(crate) fn parallel_lanes(count: u16, width_m: f64, length_m: f64) -> Vec<LaneTrack> {
+    (0..count)
+        .map(|id| LaneTrack {
+            id,
+            s_start_m: 0.0,
+            s_end_m: length_m,
+            kind: LaneKind::Driving,
+            end: crate::LaneEnd::Continues,
+            center: Curve::constant((f64::from(id) - 0.5 * (f64::from(count) - 1.0)) * width_m),
+            width: Curve::constant(width_m),
+            speed_limit: None,
+        })
+        .collect()
+}
