@@ -1,1 +1,12 @@
-//! Where the other vehicles come from: native IDM+MOBIL, SUMO over TraCI, recorded trajectories.
+//! Where the other vehicles come from.
+//!
+//! [`native`]: IDM car following and MOBIL lane changes on any road, deterministic to the bit.
+//! [`sumo`]: SUMO over TraCI. Every source implements [`tractrix_core::TrafficSource`].
+
+mod error;
+mod hash;
+pub mod native;
+mod philox;
+pub mod sumo;
+
+pub use error::TrafficError;

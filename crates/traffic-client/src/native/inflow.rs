@@ -1,0 +1,127 @@
+//! Where vehicles come from: the first fill of the road, and arrivals at the entries.
+
+use super::driver::Driver;
+use super::engine::{Engine, TICK_S};
+use super::fleet::Fleet;
+use super::lanes::LaneUse;
+use crate::philox::{Draws, Stream};
+
+/// Arrivals that wait for room at one entry, at most.
+const QUEUE: u32 = 50;
+
+/// A vehicle of the first fill.
+struct Start {
+    s_m: f64,
+    v_m_s: f64,
+    lane: u16,
+    id: u64,
+    driver: Driver,
+}
+
+impl Engine {
+    fn draw(&self, id: u64, s_m: f64) -> Driver {
+        let exits = self.map.exits.iter().copied();
+        let ahead = exits.filter(|&k| self.map.lanes[k as usize].s_start_m > s_m);
+        Driver::draw(&self.config, id, ahead)
+    }
+
+    /// Fills the through lanes with the configured density. Spacings vary by a factor; where they
+    /// are short, speeds are those of the driver's own headway, so nobody starts in an emergency.
+    pub(crate) fn fill(&mut self) {
+        let density = self.config.start_density_1_km();
+        if density <= 0.0 {
+            return;
+        }
+        let mut starts = Vec::new();
+        for (k, lane) in self.map.lanes.iter().enumerate() {
+            if lane.usage != LaneUse::Through {
+                continue;
+            }
+            let mut front_m = lane.s_end_m - 1.0;
+            let mut ahead: Option<(f64, f64)> = None;
+            for position in 0u64.. {
+                let id = self.state.next_id;
+                let driver = self.draw(id, front_m);
+                let draws = Draws::new(self.config.seed, Stream::Fill, position);
+                let spacing = (0.3 + 1.4 * draws.uniform(k as u32)) * 1000.0 / density;
+                let desired =
+                    driver.idm.desired_speed_m_s.min(lane.limit_m_s(front_m) * driver.limit_factor);
+                let mut v_m_s = desired;
+                if let Some((rear_m, speed_m_s)) = ahead {
+                    front_m = rear_m - (spacing - driver.length_m).max(1.5 * driver.idm.min_gap_m);
+                    let gap = rear_m - front_m;
+                    let own = (gap - driver.idm.min_gap_m) / driver.idm.headway_s;
+                    v_m_s = desired.min(own).min(speed_m_s + 0.1 * gap);
+                }
+                let rear_m = front_m - driver.length_m;
+                if rear_m < lane.s_start_m {
+                    break;
+                }
+                ahead = Some((rear_m, v_m_s));
+                starts.push(Start { s_m: front_m, v_m_s, lane: k as u16, id, driver });
+                self.state.next_id += 1;
+            }
+        }
+        starts.sort_by(|a, b| a.s_m.total_cmp(&b.s_m));
+        self.state.fleet = Fleet::default();
+        for x in starts {
+            self.state.fleet.insert(x.s_m, x.v_m_s, x.lane, x.id, x.driver);
+        }
+    }
+
+    /// Draws this tick's arrivals and lets in whom the traffic has room for.
+    pub(crate) fn let_in(&mut self) {
+        for k in 0..self.map.lanes.len() {
+            let lane = &self.map.lanes[k];
+            let probability = match lane.usage {
+                LaneUse::Through if lane.s_start_m < self.map.s_start_m + 1.0 => {
+                    self.config.spawn_probability
+                }
+                LaneUse::Entry => self.config.ramp_spawn_probability,
+                _ => continue,
+            } * (TICK_S / self.config.spawn_interval_s);
+            let draws = Draws::new(self.config.seed, Stream::Arrival, self.state.tick);
+            if draws.uniform(k as u32) < probability {
+                self.state.waiting[k] = (self.state.waiting[k] + 1).min(QUEUE);
+            }
+            if self.state.waiting[k] > 0 && self.enter(k as u16) {
+                self.state.waiting[k] -= 1;
+            }
+        }
+    }
+
+    /// Lets the next vehicle into a lane if nobody has to brake hard for it.
+    fn enter(&mut self, k: u16) -> bool {
+        let lane = &self.map.lanes[k as usize];
+        let id = self.state.next_id;
+        let driver = self.draw(id, lane.s_start_m);
+        let s_m = lane.s_start_m + driver.length_m;
+        let desired = driver.idm.desired_speed_m_s.min(lane.limit_m_s(s_m) * driver.limit_factor);
+        let fleet = &self.state.fleet;
+        let from = fleet.s_m.partition_point(|&s| s < lane.s_start_m);
+        let mut ahead = (from..fleet.len())
+            .find(|&i| fleet.occupies(i, k))
+            .map(|i| (fleet.rear_m(i), fleet.v_m_s[i]));
+        if let Some(span) = self.ego.in_lane(k)
+            && span.front_m >= lane.s_start_m
+            && ahead.is_none_or(|(rear_m, _)| span.rear_m < rear_m)
+        {
+            ahead = Some((span.rear_m, self.ego.speed_m_s));
+        }
+        let comfortable = |v: f64| match ahead {
+            None => true,
+            Some((rear_m, speed_m_s)) => {
+                let gap = rear_m - s_m;
+                gap > driver.idm.min_gap_m
+                    && driver.idm.interaction_m_s2(v, gap, v - speed_m_s) > -driver.idm.decel_m_s2
+            }
+        };
+        let matched = ahead.map_or(desired, |(_, v)| v.min(desired));
+        let Some(v_m_s) = [desired, matched].into_iter().find(|&v| comfortable(v)) else {
+            return false;
+        };
+        self.state.fleet.insert(s_m, v_m_s, k, id, driver);
+        self.state.next_id += 1;
+        true
+    }
+}

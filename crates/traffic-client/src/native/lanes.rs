@@ -1,0 +1,203 @@
+//! The road as the drivers need it: lanes sampled in cells, so that a step only reads tables.
+//!
+//! Cells of [`CELL_M`]; centre lines and widths are interpolated, limits, grades and neighbours
+//! hold for a cell.
+
+/// Length of a cell, m.
+pub(crate) const CELL_M: f64 = 10.0;
+const CELLS_PER_M: f64 = 1.0 / CELL_M;
+
+/// No lane.
+pub(crate) const NO_LANE: u16 = u16::MAX;
+
+/// What a lane is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum LaneUse {
+    /// Through traffic; it may end (lane drop).
+    Through,
+    /// An on-ramp: traffic enters at its start and has to leave it before its end.
+    Entry,
+    /// An off-ramp: only who wants to leave drives there.
+    Exit,
+    /// Not driven (shoulder).
+    Closed,
+}
+
+/// One lane track.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Lane {
+    pub(crate) usage: LaneUse,
+    /// Its end stops whoever is still in it.
+    pub(crate) drops: bool,
+    /// Its end leads off the road.
+    pub(crate) leaves: bool,
+    pub(crate) s_start_m: f64,
+    pub(crate) s_end_m: f64,
+    /// Offset of the centre at the cell borders from `s_start_m`, m.
+    center_d_m: Vec<f64>,
+    /// Width at the cell borders, m.
+    width_m: Vec<f64>,
+    /// Speed limit in the cell, m/s.
+    limit_m_s: Vec<f64>,
+    /// Lanes to the left and right in the cell.
+    beside: Vec<(u16, u16)>,
+}
+
+impl Lane {
+    /// Cell of a station and the fraction in it.
+    fn cell(&self, s_m: f64) -> (usize, f64) {
+        let x = ((s_m - self.s_start_m) * CELLS_PER_M).max(0.0);
+        let last = self.limit_m_s.len() - 1;
+        let k = (x as usize).min(last);
+        (k, (x - k as f64).min(1.0))
+    }
+
+    /// Offset of the lane's centre from the reference line, m.
+    pub(crate) fn center_d_m(&self, s_m: f64) -> f64 {
+        let (k, f) = self.cell(s_m);
+        self.center_d_m[k] + f * (self.center_d_m[k + 1] - self.center_d_m[k])
+    }
+
+    /// Slope of the centre against the reference line, dimensionless, positive to the left.
+    pub(crate) fn slope(&self, s_m: f64) -> f64 {
+        let k = self.cell(s_m).0;
+        (self.center_d_m[k + 1] - self.center_d_m[k]) * CELLS_PER_M
+    }
+
+    /// Width, m.
+    pub(crate) fn width_m(&self, s_m: f64) -> f64 {
+        let (k, f) = self.cell(s_m);
+        self.width_m[k] + f * (self.width_m[k + 1] - self.width_m[k])
+    }
+
+    /// Speed limit, m/s.
+    pub(crate) fn limit_m_s(&self, s_m: f64) -> f64 {
+        self.limit_m_s[self.cell(s_m).0]
+    }
+}
+
+/// One lane as functions of station, before it is put into cells.
+pub(crate) struct LaneSource<'a> {
+    pub(crate) usage: LaneUse,
+    /// Its end stops whoever is still in it.
+    pub(crate) drops: bool,
+    /// Its end leads off the road.
+    pub(crate) leaves: bool,
+    pub(crate) s_start_m: f64,
+    pub(crate) s_end_m: f64,
+    pub(crate) center_d_m: &'a dyn Fn(f64) -> f64,
+    pub(crate) width_m: &'a dyn Fn(f64) -> f64,
+    pub(crate) limit_m_s: &'a dyn Fn(f64) -> f64,
+    pub(crate) beside: &'a dyn Fn(f64) -> (u16, u16),
+}
+
+impl LaneSource<'_> {
+    pub(crate) fn sample(&self) -> Lane {
+        let cells = libm::ceil((self.s_end_m - self.s_start_m) * CELLS_PER_M).max(1.0) as usize;
+        let border = |k: usize| (self.s_start_m + k as f64 * CELL_M).min(self.s_end_m);
+        let middle = |k: usize| 0.5 * (border(k) + border(k + 1));
+        Lane {
+            usage: self.usage,
+            drops: self.drops,
+            leaves: self.leaves,
+            s_start_m: self.s_start_m,
+            s_end_m: self.s_end_m,
+            center_d_m: (0..=cells).map(|k| (self.center_d_m)(border(k))).collect(),
+            width_m: (0..=cells).map(|k| (self.width_m)(border(k))).collect(),
+            limit_m_s: (0..cells).map(|k| (self.limit_m_s)(middle(k))).collect(),
+            beside: (0..cells).map(|k| (self.beside)(middle(k))).collect(),
+        }
+    }
+}
+
+/// All lanes and the grade.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LaneMap {
+    pub(crate) lanes: Vec<Lane>,
+    /// Off-ramps in the order of their stations.
+    pub(crate) exits: Vec<u16>,
+    /// Start and end of the road, m.
+    pub(crate) s_start_m: f64,
+    pub(crate) s_end_m: f64,
+    sin_grade: Vec<f64>,
+    ends_early: Vec<bool>,
+}
+
+impl LaneMap {
+    pub(crate) fn new(
+        lanes: Vec<Lane>,
+        s_start_m: f64,
+        s_end_m: f64,
+        grade_rad: &dyn Fn(f64) -> f64,
+    ) -> Self {
+        let mut exits: Vec<u16> =
+            (0..lanes.len() as u16).filter(|&k| lanes[k as usize].usage == LaneUse::Exit).collect();
+        exits.sort_by(|&a, &b| lanes[a as usize].s_start_m.total_cmp(&lanes[b as usize].s_start_m));
+        let cells = libm::ceil((s_end_m - s_start_m) * CELLS_PER_M).max(1.0) as usize;
+        let sin_grade = (0..cells)
+            .map(|k| libm::sin(grade_rad((s_start_m + (k as f64 + 0.5) * CELL_M).min(s_end_m))))
+            .collect();
+        let ends_early = lanes
+            .iter()
+            .map(|lane| (lane.drops || lane.leaves) && lane.s_end_m < s_end_m - 1.0)
+            .collect();
+        Self { lanes, exits, s_start_m, s_end_m, sin_grade, ends_early }
+    }
+
+    /// Sine of the grade angle, positive uphill.
+    pub(crate) fn sin_grade(&self, s_m: f64) -> f64 {
+        let k = ((s_m - self.s_start_m) * CELLS_PER_M).max(0.0) as usize;
+        self.sin_grade[k.min(self.sin_grade.len() - 1)]
+    }
+
+    /// Lanes to the left and right of a lane at a station, [`NO_LANE`] if there is none.
+    pub(crate) fn beside(&self, lane: u16, s_m: f64) -> (u16, u16) {
+        let lane = &self.lanes[lane as usize];
+        let there = |k: u16| {
+            let reaches = |l: &Lane| s_m >= l.s_start_m && s_m <= l.s_end_m;
+            if k != NO_LANE && reaches(&self.lanes[k as usize]) { k } else { NO_LANE }
+        };
+        let (left, right) = lane.beside[lane.cell(s_m).0];
+        (there(left), there(right))
+    }
+
+    /// Does the lane end, for those who stay on the road, before the road does?
+    pub(crate) fn ends_early(&self, lane: u16) -> bool {
+        self.ends_early[lane as usize]
+    }
+
+    /// May a vehicle of this exit wish drive in the lane?
+    pub(crate) fn is_open_to(&self, lane: u16, exit: u16) -> bool {
+        match self.lanes[lane as usize].usage {
+            LaneUse::Through => true,
+            LaneUse::Entry | LaneUse::Closed => false,
+            LaneUse::Exit => lane == exit,
+        }
+    }
+}
+
+#[cfg(test)]
+impl LaneMap {
+    /// A level straight road with lanes of one width, lane 0 rightmost, reference line at the right
+    /// edge.
+    pub(crate) fn straight(count: u16, length_m: f64, width_m: f64, limit_m_s: f64) -> Self {
+        let lanes = (0..count).map(|k| {
+            LaneSource {
+                usage: LaneUse::Through,
+                drops: false,
+                leaves: false,
+                s_start_m: 0.0,
+                s_end_m: length_m,
+                center_d_m: &|_| (f64::from(k) + 0.5) * width_m,
+                width_m: &|_| width_m,
+                limit_m_s: &|_| limit_m_s,
+                beside: &|_| {
+                    let left = if k + 1 < count { k + 1 } else { NO_LANE };
+                    (left, k.checked_sub(1).unwrap_or(NO_LANE))
+                },
+            }
+            .sample()
+        });
+        Self::new(lanes.collect(), 0.0, length_m, &|_| 0.0)
+    }
+}

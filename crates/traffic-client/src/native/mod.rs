@@ -1,0 +1,21 @@
+//! Native traffic: IDM car following, MOBIL lane changes, inflow, ramps, grades, the ego seen by
+//! lateral overlap.
+mod config;
+mod driver;
+mod ego;
+mod engine;
+mod fleet;
+mod from_road;
+pub mod idm;
+mod inflow;
+mod lanes;
+pub mod mobil;
+mod neighbours;
+mod publish;
+mod source;
+
+pub use config::{ClassConfig, Density, FAMILY_MAX_SPEEDS_M_S, TrafficConfig};
+pub use source::{NativeCounts, NativeSnapshot, NativeTraffic};
+
+#[cfg(test)]
+mod tests;

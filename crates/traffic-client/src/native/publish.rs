@@ -1,0 +1,84 @@
+//! From the state of a tick to the scene at any instant of it.
+//!
+//! Between ticks a vehicle moves with constant acceleration (stopping at zero speed), so a scene
+//! at 100 Hz is exact, not interpolated. Across the lane it follows the quintic
+//! `10 p³ - 15 p⁴ + 6 p⁵` of the elapsed fraction p, which starts and ends without lateral speed
+//! or acceleration.
+
+use road::Road;
+use tractrix_core::{Neighbour, Scene};
+
+use super::engine::Engine;
+use super::idm::ballistic;
+use super::lanes::NO_LANE;
+
+/// Share of a lane change done after the fraction `p` of its duration, and its derivative.
+pub(crate) fn quintic(p: f64) -> (f64, f64) {
+    let p = p.clamp(0.0, 1.0);
+    let (p2, q) = (p * p, 1.0 - p);
+    (p2 * p * (10.0 + p * (6.0 * p - 15.0)), 30.0 * p2 * q * q)
+}
+
+/// Writes the vehicles within `radius_m` of `ego_s_m` into the scene, `tau_s` after the tick.
+pub(crate) fn publish(engine: &Engine, road: &Road, ego_s_m: f64, tau_s: f64, scene: &mut Scene) {
+    let (fleet, map) = (&engine.state.fleet, &engine.map);
+    let radius_m = engine.config.scene_radius_m;
+    let first = fleet.s_m.partition_point(|&s| s < ego_s_m - radius_m);
+    scene.neighbours.clear();
+    for i in first..fleet.len() {
+        let driver = &fleet.driver[i];
+        if fleet.s_m[i] - driver.length_m > ego_s_m + radius_m {
+            break;
+        }
+        let (speed_m_s, distance_m) = ballistic(fleet.v_m_s[i], fleet.a_m_s2[i], tau_s);
+        let front_s_m = fleet.s_m[i] + distance_m;
+        let rear_s_m = front_s_m - driver.length_m;
+        let middle_m = 0.5 * (front_s_m + rear_s_m);
+        let lane = &map.lanes[fleet.lane[i] as usize];
+        let mut d_m = lane.center_d_m(middle_m);
+        let mut lateral_speed_m_s = lane.slope(middle_m) * speed_m_s;
+        let target = fleet.target[i];
+        if target != NO_LANE {
+            let (done, rate) = quintic((fleet.clock_s[i] + tau_s) / driver.lane_change_s);
+            let way_m = map.lanes[target as usize].center_d_m(middle_m) - d_m;
+            d_m += done * way_m;
+            lateral_speed_m_s += rate * way_m / driver.lane_change_s;
+        }
+        let pose = road.at(middle_m, d_m);
+        scene.neighbours.push(Neighbour {
+            id: fleet.id[i],
+            class: driver.class,
+            front_s_m,
+            rear_s_m,
+            d_m,
+            width_m: engine.config.class(driver.class).width_m,
+            speed_m_s,
+            lateral_speed_m_s,
+            accel_m_s2: if speed_m_s > 0.0 { fleet.a_m_s2[i] } else { 0.0 },
+            lane: fleet.lane[i],
+            target_lane: (target != NO_LANE).then_some(target),
+            x_m: pose.x_m,
+            y_m: pose.y_m,
+            yaw_rad: pose.heading_rad + libm::atan2(lateral_speed_m_s, speed_m_s.max(1.0)),
+        });
+    }
+    scene
+        .neighbours
+        .sort_unstable_by(|a, b| a.front_s_m.total_cmp(&b.front_s_m).then(a.id.cmp(&b.id)));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quintic;
+
+    #[test]
+    fn a_lane_change_starts_and_ends_without_lateral_speed() {
+        assert_eq!(quintic(0.0), (0.0, 0.0));
+        assert_eq!(quintic(1.0), (1.0, 0.0));
+        assert_eq!(quintic(0.5).0, 0.5);
+        for p in [0.1, 0.4, 0.8] {
+            let numeric = (quintic(p + 1e-6).0 - quintic(p - 1e-6).0) / 2e-6;
+            assert!((quintic(p).1 - numeric).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Native traffic as a [`TrafficSource`]: ticks of 0.1 s inside, any instant outside.
+
+use std::sync::Arc;
+
+use road::Road;
+use tractrix_core::{EgoState, Geometry, Scene, Time, TrafficSource};
+
+use super::config::TrafficConfig;
+use super::engine::{Engine, State, TICK_S};
+use super::publish::publish;
+use crate::TrafficError;
+
+/// Length of a tick, ns.
+const TICK_NS: i64 = 100_000_000;
+
+/// Longest step that [`NativeTraffic::advance`] takes at once, s.
+const LONGEST_JUMP_S: f64 = 600.0;
+
+/// IDM + MOBIL traffic on a road.
+#[derive(Debug)]
+pub struct NativeTraffic {
+    engine: Engine,
+    road: Arc<Road>,
+    geometry: Geometry,
+    /// Start of the current tick; `None` before the first call.
+    tick_start: Option<Time>,
+    scene: Scene,
+}
+
+/// Everything that changes in a [`NativeTraffic`]: save it, restore it, the same bits go on.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NativeSnapshot {
+    state: State,
+    tick_start: Option<Time>,
+}
+
+/// Counts over a run of native traffic.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NativeCounts {
+    /// Vehicles on the road.
+    pub vehicles: usize,
+    /// Vehicles that have entered since the start, the first fill included.
+    pub entered: u64,
+    /// Distance driven by all vehicles, km.
+    pub driven_km: f64,
+    /// Lane changes begun.
+    pub lane_changes: u64,
+}
+
+impl NativeTraffic {
+    /// Traffic on `road` around an ego of the given geometry, filled and warmed up.
+    ///
+    /// # Errors
+    /// [`TrafficError::Config`] for values out of range, [`TrafficError::Road`] for a road without
+    /// lanes.
+    pub fn new(
+        road: Arc<Road>,
+        geometry: Geometry,
+        config: TrafficConfig,
+    ) -> Result<Self, TrafficError> {
+        config.validate()?;
+        let map = super::from_road::lane_map(&road)?;
+        let warm_up = (config.warm_up_s / TICK_S) as u64;
+        let mut engine = Engine::new(Arc::new(config), Arc::new(map));
+        engine.fill();
+        for _ in 0..warm_up {
+            engine.decide();
+            engine.commit();
+        }
+        Ok(Self { engine, road, geometry, tick_start: None, scene: Scene::default() })
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &TrafficConfig {
+        &self.engine.config
+    }
+
+    /// Counts so far.
+    #[must_use]
+    pub fn counts(&self) -> NativeCounts {
+        let state = &self.engine.state;
+        NativeCounts {
+            vehicles: state.fleet.len(),
+            entered: state.next_id,
+            driven_km: state.driven_m / 1000.0,
+            lane_changes: state.lane_changes,
+        }
+    }
+
+    /// Smallest bumper-to-bumper gap between two vehicles in one lane at the last tick, m; negative
+    /// after a collision. The ego is not counted.
+    #[must_use]
+    pub fn min_gap_m(&self) -> f64 {
+        self.engine.min_gap_m()
+    }
+
+    /// Saves the state. Allocates; [`NativeTraffic::save_to`] does not.
+    #[must_use]
+    pub fn snapshot(&self) -> NativeSnapshot {
+        NativeSnapshot { state: self.engine.state.clone(), tick_start: self.tick_start }
+    }
+
+    /// Saves the state into the arrays of an earlier snapshot.
+    pub fn save_to(&self, snapshot: &mut NativeSnapshot) {
+        snapshot.state.clone_from(&self.engine.state);
+        snapshot.tick_start = self.tick_start;
+    }
+
+    /// Goes back to a snapshot of traffic on the same road with the same configuration.
+    pub fn restore(&mut self, snapshot: &NativeSnapshot) {
+        self.engine.state.clone_from(&snapshot.state);
+        self.tick_start = snapshot.tick_start;
+    }
+
+    /// A fingerprint of the state (FNV-1a over the bits of station, speed and lane): equal states
+    /// give equal fingerprints.
+    #[must_use]
+    pub fn fingerprint(&self) -> u64 {
+        let fleet = &self.engine.state.fleet;
+        let mut hash = crate::hash::Fnv::default();
+        for i in 0..fleet.len() {
+            hash.add(fleet.id[i]);
+            hash.add(fleet.s_m[i].to_bits());
+            hash.add(fleet.v_m_s[i].to_bits());
+            hash.add(u64::from(fleet.lane[i]) << 16 | u64::from(fleet.target[i]));
+        }
+        hash.value()
+    }
+
+    /// Sees the ego as it was at `tick`, moved back along the road from `now`.
+    fn see_ego(&mut self, ego: &EgoState, now: Time, tick: Time) {
+        if !self.engine.config.sees_ego {
+            self.engine.ego.clear();
+            return;
+        }
+        let heading = self.road.at(ego.s_m, ego.d_m).heading_rad;
+        let shift_m = -ego.speed_m_s * now.seconds_since(tick);
+        let map = self.engine.map.clone();
+        self.engine.ego.update(ego, &self.geometry, &map, heading, shift_m);
+    }
+
+    /// Takes vehicles away that would touch the ego at the start.
+    fn clear_around_ego(&mut self) {
+        let clearance = self.engine.config.ego_clearance_m;
+        let ego = self.engine.ego.clone();
+        self.engine.state.fleet.retain(|f, i| {
+            !ego.spans().iter().any(|span| {
+                f.occupies(i, span.lane)
+                    && f.s_m[i] > span.rear_m - clearance
+                    && f.rear_m(i) < span.front_m + clearance
+            })
+        });
+    }
+}
+
+impl TrafficSource for NativeTraffic {
+    type Error = TrafficError;
+
+    fn advance(&mut self, now: Time, ego: &EgoState) -> Result<&Scene, TrafficError> {
+        ego.check_finite()?;
+        let mut start = match self.tick_start {
+            Some(start) => start,
+            None => {
+                self.see_ego(ego, now, now);
+                self.clear_around_ego();
+                self.engine.decide();
+                now
+            }
+        };
+        if now < start {
+            return Err(TrafficError::TimeBackwards {
+                asked_s: now.seconds(),
+                reached_s: start.seconds(),
+            });
+        }
+        if now.seconds_since(start) > LONGEST_JUMP_S {
+            return Err(TrafficError::TimeJump {
+                asked_s: now.seconds(),
+                reached_s: start.seconds(),
+            });
+        }
+        while now.0 - start.0 >= TICK_NS {
+            self.engine.commit();
+            start = start.plus_nanos(TICK_NS);
+            self.see_ego(ego, now, start);
+            self.engine.decide();
+        }
+        self.tick_start = Some(start);
+        publish(&self.engine, &self.road, ego.s_m, now.seconds_since(start), &mut self.scene);
+        self.scene.time = now;
+        Ok(&self.scene)
+    }
+}

@@ -1,0 +1,18 @@
+//! SUMO as a traffic source, over TraCI.
+//!
+//! Layers, each usable alone: [`codec`] (bytes), [`session`] (conversation, no I/O), [`tcp`]
+//! (socket), [`process`] (the program), [`link`] (all of them together, with the failures).
+//!
+//! SUMO is EPL-2.0/GPL-2.0; it is started as a separate program and spoken to over a socket.
+
+pub mod codec;
+mod error;
+pub mod link;
+pub mod network;
+pub mod process;
+pub mod session;
+pub mod tcp;
+
+pub use error::SumoError;
+pub use link::{Link, Timeouts};
+pub use process::Programs;

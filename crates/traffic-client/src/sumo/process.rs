@@ -1,0 +1,191 @@
+//! The SUMO process: found, started, watched, ended.
+//!
+//! Always the native program is started, never the Python wrapper that `pip` puts into `bin/`: the
+//! wrapper forks, so that a kill would hit Python and leave SUMO running.
+//!
+//! A SUMO whose client is gone ends by itself ("peer shutdown"); before a client has connected it
+//! would wait for ever, which is why a [`Process`] kills its child when it is dropped.
+
+use std::collections::VecDeque;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::error::SumoError;
+
+/// Error output that is kept, bytes.
+const STDERR_BYTES: usize = 64 << 10;
+
+/// Where SUMO's programs are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Programs {
+    /// The native `sumo`.
+    pub sumo: PathBuf,
+    /// `netconvert` beside it.
+    pub netconvert: PathBuf,
+    /// SUMO_HOME: type maps and schemas.
+    pub home: PathBuf,
+}
+
+impl Programs {
+    /// Finds SUMO: the given path, `SUMO_BINARY`, `SUMO_HOME/bin/sumo`, the Python package
+    /// `eclipse-sumo`, the PATH.
+    ///
+    /// # Errors
+    /// [`SumoError::NotFound`] says where it was looked for and how to get it.
+    pub fn find(given: Option<&Path>) -> Result<Self, SumoError> {
+        let mut tried = Vec::new();
+        let mut candidates: Vec<PathBuf> = Vec::new();
+        if let Some(path) = given {
+            candidates.push(path.to_owned());
+        } else {
+            candidates.extend(environment("SUMO_BINARY").map(PathBuf::from));
+            candidates.extend(environment("SUMO_HOME").map(|h| Path::new(&h).join("bin/sumo")));
+            candidates.extend(python_home(Path::new("python3")).map(|h| h.join("bin/sumo")));
+            let path = environment("PATH").unwrap_or_default();
+            candidates.extend(std::env::split_paths(&path).map(|dir| dir.join("sumo")));
+        }
+        for candidate in candidates {
+            match native(&candidate) {
+                Some(sumo) => return Ok(Self::beside(sumo)),
+                None => tried.push(candidate.display().to_string()),
+            }
+        }
+        Err(SumoError::NotFound { tried: tried.join(", ") })
+    }
+
+    fn beside(sumo: PathBuf) -> Self {
+        let bin = sumo.parent().unwrap_or(Path::new("")).to_owned();
+        let home = bin.parent().unwrap_or(Path::new("")).to_owned();
+        let home = if home.join("data").is_dir() { home } else { PathBuf::from("/usr/share/sumo") };
+        Self { netconvert: bin.join("netconvert"), sumo, home }
+    }
+
+    /// A command with the environment that SUMO's programs need.
+    pub(crate) fn command(&self, program: &Path) -> Command {
+        let mut command = Command::new(program);
+        command.env("SUMO_HOME", &self.home).env("PROJ_LIB", self.home.join("data/proj"));
+        command.stdin(Stdio::null());
+        command
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "the process shell looks up where SUMO is installed")]
+fn environment(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.is_empty())
+}
+
+/// The native program behind a path: itself, or what a Python wrapper stands for.
+fn native(path: &Path) -> Option<PathBuf> {
+    let mut file = std::fs::File::open(path).ok()?;
+    let mut head = [0u8; 256];
+    let n = file.read(&mut head).ok()?;
+    let head = head.get(..n)?;
+    if !head.starts_with(b"#!") {
+        return path.is_file().then(|| path.to_owned());
+    }
+    let line = std::str::from_utf8(head.split(|&b| b == b'\n').next()?).ok()?;
+    let interpreter = line.trim_start_matches("#!").trim();
+    let sumo = python_home(Path::new(interpreter))?.join("bin/sumo");
+    sumo.is_file().then_some(sumo)
+}
+
+/// SUMO_HOME of the package `eclipse-sumo` of a Python interpreter.
+fn python_home(python: &Path) -> Option<PathBuf> {
+    let out = Command::new(python)
+        .args(["-c", "import sumo; print(sumo.SUMO_HOME)"])
+        .stdin(Stdio::null())
+        .stderr(Stdio::null())
+        .output()
+        .ok()?;
+    let home = String::from_utf8(out.stdout).ok()?;
+    out.status.success().then(|| PathBuf::from(home.trim()))
+}
+
+/// A running SUMO.
+#[derive(Debug)]
+pub struct Process {
+    child: Child,
+    stderr: Arc<Mutex<VecDeque<u8>>>,
+}
+
+impl Process {
+    /// Starts SUMO with these options.
+    ///
+    /// # Errors
+    /// [`SumoError::Startup`] if the system cannot start it.
+    #[expect(clippy::disallowed_methods, reason = "the error output of SUMO is read by a thread")]
+    pub fn start(programs: &Programs, options: &[String]) -> Result<Self, SumoError> {
+        let mut child = programs
+            .command(&programs.sumo)
+            .args(options)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|e| SumoError::Startup {
+                exit: "not started".to_owned(),
+                stderr: e.to_string(),
+            })?;
+        let stderr = Arc::new(Mutex::new(VecDeque::new()));
+        if let Some(mut pipe) = child.stderr.take() {
+            let ring = Arc::clone(&stderr);
+            std::thread::spawn(move || {
+                let mut chunk = [0u8; 4096];
+                while let Ok(n) = pipe.read(&mut chunk) {
+                    let Some(new) = chunk.get(..n).filter(|new| !new.is_empty()) else { break };
+                    let mut ring = ring.lock().unwrap_or_else(PoisonError::into_inner);
+                    ring.extend(new);
+                    let over = ring.len().saturating_sub(STDERR_BYTES);
+                    ring.drain(..over);
+                }
+            });
+        }
+        Ok(Self { child, stderr })
+    }
+
+    /// Process id, for those who watch it.
+    #[must_use]
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Does it still run?
+    pub fn is_alive(&mut self) -> bool {
+        matches!(self.child.try_wait(), Ok(None))
+    }
+
+    /// How it ended, in words; waits up to a fifth of a second for a process that is just ending.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "gives an ending process time to leave its status"
+    )]
+    pub fn ending(&mut self) -> String {
+        for _ in 0..100 {
+            match self.child.try_wait() {
+                Ok(Some(status)) => return status.to_string(),
+                Ok(None) => std::thread::sleep(std::time::Duration::from_millis(2)),
+                Err(e) => return e.to_string(),
+            }
+        }
+        "still running".to_owned()
+    }
+
+    /// The last lines of its error output.
+    #[must_use]
+    pub fn last_words(&self) -> String {
+        let ring = self.stderr.lock().unwrap_or_else(PoisonError::into_inner);
+        let bytes: Vec<u8> = ring.iter().copied().collect();
+        let text = String::from_utf8_lossy(&bytes);
+        let useful = text.lines().filter(|line| !line.contains("proj.db"));
+        let lines: Vec<&str> = useful.collect();
+        lines.get(lines.len().saturating_sub(8)..).unwrap_or_default().join(" | ")
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,114 @@
+//! The socket: sends one request, waits for its answer, never longer than it is told to.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
+use std::time::{Duration, Instant};
+
+use super::codec::Frames;
+use super::error::SumoError;
+
+/// A connection to SUMO.
+#[derive(Debug)]
+pub struct Connection {
+    stream: TcpStream,
+    frames: Frames,
+    body: Vec<u8>,
+    chunk: Vec<u8>,
+}
+
+/// Why no answer came; the caller knows what to say about the process.
+#[derive(Debug)]
+pub enum LinkError {
+    /// The peer closed or reset the connection.
+    Closed,
+    /// No complete answer in time.
+    TimedOut,
+    /// The answer breaks the protocol.
+    Protocol(super::codec::ProtocolError),
+}
+
+#[expect(clippy::disallowed_methods, reason = "the socket shell needs a clock for its deadlines")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+impl Connection {
+    /// Connects to a local port as soon as it opens. `is_alive` is asked between attempts.
+    ///
+    /// # Errors
+    /// `None` in the error: the process ended; otherwise a timeout.
+    #[expect(clippy::disallowed_methods, reason = "this is the one place that opens SUMO's socket")]
+    pub fn open(
+        port: u16,
+        timeout: Duration,
+        mut is_alive: impl FnMut() -> bool,
+    ) -> Result<Self, LinkError> {
+        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+        let deadline = now() + timeout;
+        loop {
+            if let Ok(stream) = TcpStream::connect_timeout(&address, Duration::from_secs(1)) {
+                // Without this a step costs 40 ms (delayed acknowledgement).
+                let _ = stream.set_nodelay(true);
+                return Ok(Self {
+                    stream,
+                    frames: Frames::default(),
+                    body: Vec::new(),
+                    chunk: vec![0; 1 << 16],
+                });
+            }
+            if !is_alive() {
+                return Err(LinkError::Closed);
+            }
+            if now() >= deadline {
+                return Err(LinkError::TimedOut);
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Sends a request and waits for its answer, which is returned without its length.
+    ///
+    /// # Errors
+    /// [`LinkError`]; the connection is unusable afterwards.
+    pub fn exchange(&mut self, message: &[u8], timeout: Duration) -> Result<&[u8], LinkError> {
+        let deadline = now() + timeout;
+        self.stream.set_write_timeout(Some(timeout)).map_err(|_| LinkError::Closed)?;
+        self.stream.write_all(message).map_err(|e| link(&e))?;
+        loop {
+            if self.frames.take(&mut self.body).map_err(LinkError::Protocol)? {
+                return Ok(&self.body);
+            }
+            let left = deadline.saturating_duration_since(now());
+            if left.is_zero() {
+                return Err(LinkError::TimedOut);
+            }
+            self.stream.set_read_timeout(Some(left)).map_err(|_| LinkError::Closed)?;
+            match self.stream.read(&mut self.chunk) {
+                Ok(0) => return Err(LinkError::Closed),
+                Ok(n) => self.frames.push(self.chunk.get(..n).unwrap_or_default()),
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(link(&e)),
+            }
+        }
+    }
+}
+
+fn link(e: &std::io::Error) -> LinkError {
+    match e.kind() {
+        ErrorKind::WouldBlock | ErrorKind::TimedOut => LinkError::TimedOut,
+        _ => LinkError::Closed,
+    }
+}
+
+/// A port that is free now.
+///
+/// # Errors
+/// [`SumoError::File`] if the system gives none.
+#[expect(clippy::disallowed_methods, reason = "asks the system for a free port for SUMO")]
+pub fn free_port() -> Result<u16, SumoError> {
+    let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+    std::net::TcpListener::bind(any)
+        .and_then(|listener| listener.local_addr())
+        .map(|address| address.port())
+        .map_err(|e| SumoError::File { path: "127.0.0.1:0".to_owned(), why: e.to_string() })
+}
