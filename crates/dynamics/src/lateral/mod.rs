@@ -8,7 +8,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `parameters` | the truck file's lateral part, checks, axle loads from masses and payload |
-//! | `tyre` | cornering stiffness over load, brush saturation, friction ellipse |
+//! | `tyre` | cornering stiffness over load, saturation, friction ellipse |
 //! | `kinematic` | Eq. 1 of the paper, corrected, with effective lengths of axle groups |
 //! | `yaw_sideslip` | Eq. 3-10 of the paper, corrected: the 4-state model |
 //! | `steering` | hand wheel to road wheel: limits, offset, free play, ratio, lag |
@@ -40,7 +40,7 @@ pub use parameters::{
     LateralError, LateralParameters, PayloadParameters, TractorParameters, TrailerParameters,
 };
 pub use steering::{SteeringParameters, SteeringState};
-pub use tyre::{TyreLaw, TyreParameters};
+pub use tyre::{LoadedAxle, TyreLaw, TyreParameters};
 pub use yaw_sideslip::{StateSpace, YawSideslip};
 
 /// Number of axles: steer, two drive, three trailer. A single axle is a group of zero spread.

@@ -292,7 +292,12 @@ impl LateralModel {
         if weight >= 1.0 {
             return dynamic;
         }
-        let k = self.kinematic.velocity(speed, delta, -s[3]);
+        let mut k = self.kinematic.velocity(speed, delta, -s[3]);
+        if s[3].abs() >= self.max_articulation_rad
+            && (k.yaw_rate_rad_s - k.trailer_yaw_rate_rad_s) * s[3] > 0.0
+        {
+            k.trailer_yaw_rate_rad_s = k.yaw_rate_rad_s;
+        }
         let mix = |d: f64, k: f64| k + weight * (d - k);
         Motion {
             lateral_speed_m_s: mix(dynamic.lateral_speed_m_s, k.lateral_speed_m_s),
@@ -316,6 +321,7 @@ impl LateralModel {
             specific_force_m_s2: inputs.accel_x_m_s2
                 + tractrix_core::GRAVITY_M_S2 * inputs.grade_rad,
             longitudinal_n: inputs.axle_longitudinal_force_n,
+            tyres: m.tyres(&inputs.axle_longitudinal_force_n),
         }
     }
 
@@ -334,7 +340,8 @@ impl LateralModel {
             -state.articulation_rad,
         ];
         let slip_rad = m.slip_rad(v, &s, delta);
-        let side_force_n = m.side_force_n(&slip_rad, &loads);
+        let side_force_n: [f64; AXLES] =
+            core::array::from_fn(|j| loads.tyres[j].side_force_n(slip_rad[j]));
         let [vy_dot, wc_dot, wt_dot] = m.accelerations(&m.force(v, &s, delta, &loads));
         let u = self.motion(inputs.speed_m_s, weight, &s, delta);
         // Below the blend the turn is taken as steady.

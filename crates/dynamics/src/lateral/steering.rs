@@ -1,7 +1,8 @@
 //! From the hand wheel to the road wheels.
 //!
 //! Order of the parts: angle and rate limit of the hand wheel, free play (backlash) of the steering
-//! gear, offset, ratio, first-order lag. The lag is integrated exactly.
+//! gear, offset, ratio, first-order lag. The wheel goes to its demand at the full rate and waits there;
+//! the lag's response to that ramp is exact, so that the result does not depend on the step length.
 //!
 //! Left out: steering compliance under aligning moment, left-right (Ackermann) difference.
 
@@ -57,12 +58,24 @@ impl SteeringParameters {
         let play = 0.5 * self.free_play_rad;
         let gear = state.gear_rad.clamp(wheel - play, wheel + play);
         let target = (gear - self.offset_rad) / self.ratio;
-        let keep = if self.lag_s > 0.0 { libm::exp(-dt_s / self.lag_s) } else { 0.0 };
-        SteeringState {
-            wheel_rad: wheel,
-            gear_rad: gear,
-            road_wheel_rad: target + keep * (state.road_wheel_rad - target),
-        }
+        let road_wheel = if self.lag_s > 0.0 {
+            let after = |t: f64| libm::exp(-t / self.lag_s);
+            let from = (state.gear_rad - self.offset_rad) / self.ratio;
+            let held = target + (state.road_wheel_rad - from) * after(dt_s);
+            let moved = gear - state.gear_rad;
+            if moved == 0.0 {
+                held
+            } else {
+                // The wheel turns at its full rate, takes up the play, then moves the gear.
+                let end = (wheel - state.wheel_rad).abs() / self.max_wheel_rate_rad_s;
+                let start = end - moved.abs() / self.max_wheel_rate_rad_s;
+                let rate = moved.signum() * self.max_wheel_rate_rad_s / self.ratio;
+                held - rate * self.lag_s * (after(dt_s - end) - after(dt_s - start))
+            }
+        } else {
+            target
+        };
+        SteeringState { wheel_rad: wheel, gear_rad: gear, road_wheel_rad: road_wheel }
     }
 
     /// Hand-wheel angle, rad, that holds this road-wheel angle, rad (free play at its middle).
@@ -89,7 +102,7 @@ mod tests {
 
     #[test]
     fn the_lag_is_exact_whatever_the_step_length() {
-        let p = SteeringParameters { free_play_rad: 0.0, ..gear() };
+        let p = SteeringParameters { max_wheel_rate_rad_s: 10.0, ..gear() };
         let run = |n: usize| {
             let mut s = SteeringState::default();
             for _ in 0..n {
@@ -97,9 +110,12 @@ mod tests {
             }
             s.road_wheel_rad
         };
-        let exact = (1.0 - (-2.0_f64).exp()) / 20.0;
-        assert!((run(1) - exact).abs() < 1e-15);
-        assert!((run(160) - exact).abs() < 1e-15);
+        // A ramp of 0.1 s through the play, then hold.
+        let ramp = |t: f64| 10.0 / 20.0 * (t - 0.08 * (1.0 - (-t / 0.08).exp()));
+        let exact = ramp(0.16 - 0.005) - ramp(0.06);
+        for n in [1, 7, 160] {
+            assert!((run(n) - exact).abs() < 1e-14, "{n} steps: {}", run(n));
+        }
     }
 
     #[test]

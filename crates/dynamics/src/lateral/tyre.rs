@@ -7,9 +7,15 @@
 //! | alpha | slip angle, rad, positive when it gives a force to the left |
 //! | mu | friction coefficient |
 //!
-//! `C = c F_z (1 - k (F_z,tyre / F_rated - 1))`: stiffness grows less than load. Saturation is the
-//! brush model (Fiala; Pacejka, "Tire and Vehicle Dynamics", 3rd ed., sect. 3.2). Under a
-//! longitudinal force the side force that is left follows the friction ellipse.
+//! `C = c F_z (1 - k (F_z,tyre / F_rated - 1))`: stiffness grows less than load. Saturation:
+//!
+//! ```text
+//! F = F_max z (15 - 10 z² + 3 z⁴) / 8,   z = 8 C alpha / (15 F_max) limited to -1..1,   F_max = mu F_z
+//! ```
+//! the odd polynomial that starts with slope C, reaches F_max with slope and curvature zero and meets the tyre table of the
+//! paper's released truck (34.3 kN: 6269, 12192, 21948 N at 1, 2, 4 degrees) within 0.5 %; the
+//! brush model is 15 % low there. Under a longitudinal force the side force that is left follows
+//! the friction ellipse.
 //!
 //! Left out: camber, aligning moment, relaxation length, speed-dependent friction.
 
@@ -44,7 +50,7 @@ pub struct TyreParameters {
 pub enum TyreLaw {
     /// `F = C alpha`, without bound (the paper's model).
     Linear,
-    /// Brush model with the friction coefficient `friction_coeff`, reduced by longitudinal force.
+    /// Side force up to `friction_coeff` times load, less under longitudinal force.
     Saturating {
         /// Friction coefficient mu of the road.
         friction_coeff: f64,
@@ -92,35 +98,56 @@ impl TyreParameters {
     }
 }
 
+/// The tyres of one axle under one vertical and longitudinal load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoadedAxle {
+    stiffness_n_rad: f64,
+    /// Largest side force, N; infinite for the linear law.
+    limit_n: f64,
+    /// `z / alpha`, 1/rad.
+    steepness_per_rad: f64,
+}
+
 impl TyreLaw {
-    /// Side force of an axle, N: stiffness, N/rad; load, N; longitudinal force, N; slip angle, rad.
+    /// The axle under load: cornering stiffness, N/rad; vertical load, N; longitudinal force, N.
     #[inline]
     #[must_use]
-    pub fn side_force_n(
+    pub fn under_load(
         self,
         stiffness_n_rad: f64,
         load_n: f64,
         longitudinal_force_n: f64,
-        slip_rad: f64,
-    ) -> f64 {
+    ) -> LoadedAxle {
         match self {
-            Self::Linear => stiffness_n_rad * slip_rad,
+            Self::Linear => {
+                LoadedAxle { stiffness_n_rad, limit_n: f64::INFINITY, steepness_per_rad: 0.0 }
+            }
             Self::Saturating { friction_coeff } => {
                 let limit = friction_coeff * load_n.max(1.0);
                 let used = (longitudinal_force_n / limit).clamp(-0.99, 0.99);
                 let left = libm::sqrt(1.0 - used * used);
-                brush(stiffness_n_rad * left, limit * left, slip_rad)
+                LoadedAxle {
+                    stiffness_n_rad: stiffness_n_rad * left,
+                    limit_n: limit * left,
+                    steepness_per_rad: 8.0 / 15.0 * stiffness_n_rad / limit,
+                }
             }
         }
     }
 }
 
-/// Brush model: `F = F_max (3 z - 3 z|z| + z³)` with `z = C alpha / (3 F_max)`, full sliding at
-/// `|z| = 1`.
-#[inline]
-fn brush(stiffness: f64, limit: f64, slip: f64) -> f64 {
-    let z = (stiffness * slip / (3.0 * limit)).clamp(-1.0, 1.0);
-    limit * z * (3.0 - 3.0 * z.abs() + z * z)
+impl LoadedAxle {
+    /// Side force, N, at this slip angle, rad.
+    #[inline]
+    #[must_use]
+    pub fn side_force_n(&self, slip_rad: f64) -> f64 {
+        if self.steepness_per_rad == 0.0 {
+            return self.stiffness_n_rad * slip_rad;
+        }
+        let z = (self.steepness_per_rad * slip_rad).clamp(-1.0, 1.0);
+        let z2 = z * z;
+        self.limit_n * z * (1.875 - 1.25 * z2 + 0.375 * z2 * z2)
+    }
 }
 
 #[cfg(test)]
@@ -128,19 +155,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_brush_model_starts_with_the_cornering_stiffness_and_ends_at_the_friction_limit() {
+    fn the_saturating_law_meets_the_published_tyre_table() {
+        let law = TyreLaw::Saturating { friction_coeff: 0.85 };
+        for (slip_deg, force) in [(1.0_f64, 6269.0), (2.0, 12_192.0), (4.0, 21_948.0)] {
+            let f = law.under_load(362e3, 34_300.0, 0.0).side_force_n(slip_deg.to_radians());
+            assert!((f / force - 1.0).abs() < 5e-3, "{slip_deg} degrees: {f} N");
+        }
+    }
+
+    #[test]
+    fn side_force_starts_with_the_cornering_stiffness_and_ends_at_the_friction_limit() {
         let law = TyreLaw::Saturating { friction_coeff: 0.8 };
-        let slope = law.side_force_n(4e5, 6e4, 0.0, 1e-6) / 1e-6;
+        let slope = law.under_load(4e5, 6e4, 0.0).side_force_n(1e-6) / 1e-6;
         assert!((slope / 4e5 - 1.0).abs() < 1e-5);
-        assert!((law.side_force_n(4e5, 6e4, 0.0, 1.0) - 0.8 * 6e4).abs() < 1e-9);
-        assert_eq!(law.side_force_n(4e5, 6e4, 0.0, -0.05), -law.side_force_n(4e5, 6e4, 0.0, 0.05));
+        assert!((law.under_load(4e5, 6e4, 0.0).side_force_n(1.0) - 0.8 * 6e4).abs() < 1e-9);
+        assert_eq!(
+            law.under_load(4e5, 6e4, 0.0).side_force_n(-0.05),
+            -law.under_load(4e5, 6e4, 0.0).side_force_n(0.05)
+        );
     }
 
     #[test]
     fn braking_takes_side_force_along_the_friction_ellipse() {
         let law = TyreLaw::Saturating { friction_coeff: 0.5 };
         let (fx, fz): (f64, f64) = (-3e4, 1e5);
-        let fy = law.side_force_n(6e5, fz, fx, 1.0);
+        let fy = law.under_load(6e5, fz, fx).side_force_n(1.0);
         assert!(((fx * fx + fy * fy).sqrt() / (0.5 * fz) - 1.0).abs() < 1e-12);
     }
 }

@@ -27,7 +27,7 @@
 
 use tractrix_core::GRAVITY_M_S2;
 
-use super::{AXLES, LateralParameters, TyreLaw};
+use super::{AXLES, LateralParameters, LoadedAxle, TyreLaw};
 
 /// Three generalised forces: along v_yc, about the tractor's CG, about the hitch.
 pub(super) type Force3 = [f64; 3];
@@ -75,7 +75,7 @@ pub struct StateSpace {
 }
 
 /// External loads and longitudinal quantities that the side forces depend on.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Loads {
     /// Side force at and yaw moment about the tractor's CG.
     pub(super) tractor: [f64; 2],
@@ -85,6 +85,8 @@ pub(super) struct Loads {
     pub(super) specific_force_m_s2: f64,
     /// Longitudinal force of each axle, N.
     pub(super) longitudinal_n: [f64; AXLES],
+    /// Tyres of each axle under these loads.
+    pub(super) tyres: [LoadedAxle; AXLES],
 }
 
 impl YawSideslip {
@@ -191,23 +193,19 @@ impl YawSideslip {
         ]
     }
 
-    /// Side force of every axle, N.
+    /// Tyres of every axle under its static and these longitudinal loads, N.
     #[inline]
-    pub(super) fn side_force_n(&self, slip: &[f64; AXLES], loads: &Loads) -> [f64; AXLES] {
+    pub(super) fn tyres(&self, longitudinal_n: &[f64; AXLES]) -> [LoadedAxle; AXLES] {
         core::array::from_fn(|j| {
-            self.law.side_force_n(
-                self.stiffness_n_rad[j],
-                self.axle_load_n[j],
-                loads.longitudinal_n[j],
-                slip[j],
-            )
+            self.law.under_load(self.stiffness_n_rad[j], self.axle_load_n[j], longitudinal_n[j])
         })
     }
 
     /// Generalised forces g of `H s' = g`, first three rows.
     #[inline]
     pub(super) fn force(&self, v: f64, s: &[f64; 4], delta: f64, loads: &Loads) -> Force3 {
-        let f = self.side_force_n(&self.slip_rad(v, s, delta), loads);
+        let slip = self.slip_rad(v, s, delta);
+        let f: [f64; AXLES] = core::array::from_fn(|j| loads.tyres[j].side_force_n(slip[j]));
         let x = &self.axle_position_m;
         let fx = &loads.longitudinal_n;
         let [_, wc, _, gamma] = *s;

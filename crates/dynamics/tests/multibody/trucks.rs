@@ -65,3 +65,22 @@ pub(crate) fn loaded_55t() -> LateralParameters {
     p.trailer.cg_behind_hitch_m = 5.6;
     p
 }
+
+/// The rigid two-axle vehicle of the paper's released model: 18 t, one steer and one rear axle,
+/// direct steering with ratio 22; the trailer is a feather without side force.
+pub(crate) fn released_two_axle() -> LateralParameters {
+    let mut p = empty_19t();
+    p.tractor = TractorParameters {
+        mass_kg: 18_000.0,
+        yaw_inertia_kg_m2: 901_125.0,
+        steer_axle_ahead_of_cg_m: 1.5,
+        drive_group_behind_cg_m: 2.4,
+        drive_half_spread_m: 0.0,
+        hitch_behind_cg_m: 2.1,
+    };
+    (p.trailer.mass_kg, p.trailer.yaw_inertia_kg_m2) = (1.0, 10.0);
+    p.tyres.axle_stiffness_n_rad = Some([4e5, 8e5, 8e5, 1.0, 1.0, 1.0]);
+    (p.steering.ratio, p.steering.lag_s) = (22.0, 0.0);
+    p.steering.max_wheel_rate_rad_s = 1000.0;
+    p
+}
