@@ -10,3 +10,6 @@ mod philox;
 pub mod sumo;
 
 pub use error::TrafficError;
+
+/// Longest step that a source takes at once, s.
+pub(crate) const LONGEST_JUMP_S: f64 = 600.0;

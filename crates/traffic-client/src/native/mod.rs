@@ -15,6 +15,10 @@ mod publish;
 mod source;
 
 pub use config::{ClassConfig, Density, FAMILY_MAX_SPEEDS_M_S, TrafficConfig};
+pub(crate) use ego::EgoSpans;
+pub(crate) use from_road::lane_map;
+pub(crate) use lanes::LaneMap;
+pub(crate) use publish::carry_on;
 pub use source::{NativeCounts, NativeSnapshot, NativeTraffic};
 
 #[cfg(test)]

@@ -67,6 +67,22 @@ pub(crate) fn publish(engine: &Engine, road: &Road, ego_s_m: f64, tau_s: f64, sc
         .sort_unstable_by(|a, b| a.front_s_m.total_cmp(&b.front_s_m).then(a.id.cmp(&b.id)));
 }
 
+/// A neighbour `tau_s` later, carried on with its speed and acceleration in the direction of its
+/// body.
+pub(crate) fn carry_on(n: &Neighbour, tau_s: f64) -> Neighbour {
+    let (speed_m_s, distance_m) = ballistic(n.speed_m_s, n.accel_m_s2, tau_s);
+    let (sin, cos) = (libm::sin(n.yaw_rad), libm::cos(n.yaw_rad));
+    Neighbour {
+        front_s_m: n.front_s_m + distance_m,
+        rear_s_m: n.rear_s_m + distance_m,
+        d_m: n.d_m + n.lateral_speed_m_s * tau_s,
+        x_m: n.x_m + distance_m * cos,
+        y_m: n.y_m + distance_m * sin,
+        speed_m_s,
+        ..*n
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::quintic;

@@ -13,9 +13,6 @@ use crate::TrafficError;
 /// Length of a tick, ns.
 const TICK_NS: i64 = 100_000_000;
 
-/// Longest step that [`NativeTraffic::advance`] takes at once, s.
-const LONGEST_JUMP_S: f64 = 600.0;
-
 /// IDM + MOBIL traffic on a road.
 #[derive(Debug)]
 pub struct NativeTraffic {
@@ -174,7 +171,7 @@ impl TrafficSource for NativeTraffic {
                 reached_s: start.seconds(),
             });
         }
-        if now.seconds_since(start) > LONGEST_JUMP_S {
+        if now.seconds_since(start) > crate::LONGEST_JUMP_S {
             return Err(TrafficError::TimeJump {
                 asked_s: now.seconds(),
                 reached_s: start.seconds(),

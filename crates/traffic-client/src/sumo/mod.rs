@@ -5,14 +5,19 @@
 //!
 //! SUMO is EPL-2.0/GPL-2.0; it is started as a separate program and spoken to over a socket.
 
+mod check;
 pub mod codec;
+mod demand;
 mod error;
 pub mod link;
 pub mod network;
 pub mod process;
 pub mod session;
+mod source;
 pub mod tcp;
 
+pub use check::{ImportCheck, TOLERANCE_M, check};
 pub use error::SumoError;
 pub use link::{Link, Timeouts};
 pub use process::Programs;
+pub use source::{SumoConfig, SumoTraffic};

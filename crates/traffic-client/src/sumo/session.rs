@@ -19,12 +19,10 @@ pub mod id {
     pub const LOAD: u8 = 0x01;
     /// Simulation step.
     pub const STEP: u8 = 0x02;
-    /// Order of the clients.
-    pub const ORDER: u8 = 0x03;
     /// Close.
     pub const CLOSE: u8 = 0x7f;
-    /// Subscribe to the surroundings of a vehicle.
-    pub const CONTEXT_VEHICLE: u8 = 0x84;
+    /// Subscribe to the surroundings of an object: add the domain.
+    pub const CONTEXT: u8 = 0x80;
     /// Get: add the domain.
     pub const GET: u8 = 0xa0;
     /// Set: add the domain.
@@ -37,6 +35,8 @@ pub mod id {
     pub const VEHICLE_TYPE: u8 = 0x05;
     /// Domain: routes.
     pub const ROUTE: u8 = 0x06;
+    /// Domain: points of interest.
+    pub const POI: u8 = 0x07;
     /// Domain: lanes.
     pub const LANE: u8 = 0x03;
     /// Domain: simulation.
@@ -192,12 +192,6 @@ impl Session {
         self.expect(id::LOAD, 0, Expect::Status)
     }
 
-    /// Says which client goes first.
-    pub fn order(&mut self, number: i32) -> &mut Self {
-        self.writer.begin(id::ORDER).i32(number).end();
-        self.expect(id::ORDER, 0, Expect::Status)
-    }
-
     /// Closes the simulation.
     pub fn close(&mut self) -> &mut Self {
         self.writer.begin(id::CLOSE).end();
@@ -228,16 +222,24 @@ impl Session {
         self.expect(id::SET | id::VEHICLE, var::MOVE_TO_XY, Expect::Status)
     }
 
-    /// Subscribes to the vehicles around a vehicle.
-    pub fn subscribe_context(&mut self, object: &str, radius_m: f64) -> &mut Self {
-        let w = self.writer.begin(id::CONTEXT_VEHICLE);
+    /// Moves a point of interest, m. Hot: written without an allocation.
+    pub fn move_poi(&mut self, object: &str, x_m: f64, y_m: f64) -> &mut Self {
+        let w = self.writer.begin(id::SET | id::POI).u8(var::POSITION).str(object);
+        w.u8(tag::POS_2D).f64(x_m).f64(y_m).end();
+        self.expect(id::SET | id::POI, var::POSITION, Expect::Status)
+    }
+
+    /// Subscribes to the vehicles around an object of a domain.
+    pub fn subscribe_context(&mut self, domain: u8, object: &str, radius_m: f64) -> &mut Self {
+        let command = id::CONTEXT | domain;
+        let w = self.writer.begin(command);
         w.f64(INVALID_DOUBLE).f64(INVALID_DOUBLE).str(object);
         w.u8(id::GET | id::VEHICLE).f64(radius_m).u8(CONTEXT_VARIABLES.len() as u8);
         for variable in CONTEXT_VARIABLES {
             w.u8(variable);
         }
         w.end();
-        self.expect(id::CONTEXT_VEHICLE, 0, Expect::Context)
+        self.expect(command, 0, Expect::Context)
     }
 
     /// One simulation step; the last command of a request.
@@ -308,7 +310,7 @@ impl Session {
                 self.seen.clear();
                 for _ in 0..n.max(0) {
                     let (found, mut r) = reader.command()?;
-                    if found != id::CONTEXT_VEHICLE + 0x10 {
+                    if found & 0xf0 != (id::CONTEXT + 0x10) {
                         return Err(reader.error(format!("unexpected subscription 0x{found:02x}")));
                     }
                     self.read_context(&mut r)?;

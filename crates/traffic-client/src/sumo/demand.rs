@@ -1,0 +1,171 @@
+//! What drives in SUMO: vehicle types, routes, the first fill and the inflow, from the same
+//! [`TrafficConfig`] as native traffic.
+//!
+//! Car following is SUMO's IDM, lane changing its LC2013 (SUMO has no MOBIL), with changes that take
+//! time (`--lanechange.duration`). Trucks do not slow on grades in SUMO; that is a limit of SUMO.
+
+use std::fmt::Write as _;
+
+use tractrix_core::{Geometry, VehicleClass};
+
+use super::network::Network;
+use crate::native::{ClassConfig, TrafficConfig};
+use crate::philox::{Draws, Stream};
+
+/// Id of the ego in SUMO, and of its type.
+pub(crate) const EGO: &str = "ego";
+/// Id of the vehicle that stands for the ego in a neighbour lane.
+pub(crate) const GHOST: &str = "ego_ghost";
+/// Id of the route of the ego.
+pub(crate) const EGO_ROUTE: &str = "through";
+/// Longest time that flows run, s.
+const FOREVER_S: &str = "1000000";
+
+const CLASSES: [(VehicleClass, &str, &str); 3] = [
+    (VehicleClass::Car, "car", "passenger"),
+    (VehicleClass::Van, "van", "delivery"),
+    (VehicleClass::Truck, "truck", "trailer"),
+];
+
+/// The class behind a type id.
+pub(crate) fn class_of(type_id: &str) -> VehicleClass {
+    CLASSES
+        .iter()
+        .find(|(_, name, _)| type_id.starts_with(name))
+        .map_or(VehicleClass::Car, |(class, _, _)| *class)
+}
+
+/// The route file. `through` is the longest route; `free_m` the stretch of it that stays empty for
+/// the ego.
+pub(crate) fn route_file(
+    config: &TrafficConfig,
+    network: &Network,
+    geometry: &Geometry,
+    free_m: std::ops::Range<f64>,
+) -> String {
+    let mut out = String::from("<routes>\n");
+    let share = |class| match class {
+        VehicleClass::Car => 1.0 - config.van_share_frac - config.truck_share_frac,
+        VehicleClass::Van => config.van_share_frac,
+        VehicleClass::Truck => config.truck_share_frac,
+    };
+    let _ = writeln!(out, "<vTypeDistribution id=\"mix\">");
+    for (class, name, v_class) in CLASSES {
+        vehicle_type(&mut out, name, v_class, config.class(class), share(class));
+    }
+    let _ = writeln!(out, "</vTypeDistribution>");
+    let _ = writeln!(
+        out,
+        "<vType id=\"{EGO}\" vClass=\"trailer\" length=\"{:.2}\" width=\"{:.2}\" maxSpeed=\"60\" \
+         minGap=\"0.5\" insertionChecks=\"none\"/>",
+        geometry.length_m(),
+        geometry.width_m
+    );
+    let entries = network.entries();
+    let mut routes: Vec<Vec<String>> =
+        entries.iter().flat_map(|entry| network.routes_from(entry)).collect();
+    routes.sort_by(|a, b| network.route_length_m(b).total_cmp(&network.route_length_m(a)));
+    for (k, route) in routes.iter().enumerate() {
+        let id = if k == 0 { EGO_ROUTE.to_owned() } else { format!("route{k}") };
+        let _ = writeln!(out, "<route id=\"{id}\" edges=\"{}\"/>", route.join(" "));
+    }
+    if let Some(through) = routes.first() {
+        fill(&mut out, config, network, through, &free_m);
+    }
+    flows(&mut out, config, network, &routes);
+    out.push_str("</routes>\n");
+    out
+}
+
+fn vehicle_type(out: &mut String, name: &str, v_class: &str, c: &ClassConfig, share: f64) {
+    let (mean, sigma) = (c.speed_factor_frac, c.speed_factor_sigma_frac);
+    let _ = writeln!(
+        out,
+        "<vType id=\"{name}\" vClass=\"{v_class}\" probability=\"{share}\" carFollowModel=\"IDM\" \
+         length=\"{}\" width=\"{}\" tau=\"{}\" minGap=\"{}\" accel=\"{}\" decel=\"{}\" \
+         emergencyDecel=\"{}\" maxSpeed=\"70\" speedFactor=\"normc({mean},{sigma},{},{})\"/>",
+        c.length_m,
+        c.width_m,
+        c.headway_s,
+        c.min_gap_m,
+        c.accel_m_s2,
+        c.decel_m_s2,
+        c.max_decel_m_s2,
+        mean - 3.0 * sigma,
+        mean + 3.0 * sigma
+    );
+}
+
+/// Vehicles at the start, spaced as in native traffic, along the through route.
+fn fill(
+    out: &mut String,
+    config: &TrafficConfig,
+    network: &Network,
+    through: &[String],
+    free_m: &std::ops::Range<f64>,
+) {
+    let density = config.start_density_1_km();
+    if density <= 0.0 {
+        return;
+    }
+    let mut begin_m = 0.0;
+    let mut number = 0u64;
+    for (k, edge) in through.iter().enumerate() {
+        let length_m = network.lanes_of(edge).next().map_or(0.0, |lane| lane.length_m);
+        let rest = through.get(k..).unwrap_or_default().join(" ");
+        for lane in network.lanes_of(edge) {
+            let mut at_m = 0.0;
+            loop {
+                let draws = Draws::new(config.seed, Stream::Fill, number);
+                number += 1;
+                at_m += ((0.3 + 1.4 * draws.uniform(0)) * 1000.0 / density).max(25.0);
+                if at_m > length_m {
+                    break;
+                }
+                if free_m.contains(&(begin_m + at_m)) {
+                    continue;
+                }
+                let speed = 0.9 * lane.speed_m_s.min(config.max_speed_m_s);
+                let _ = writeln!(
+                    out,
+                    "<vehicle id=\"fill{number}\" type=\"mix\" depart=\"0\" departLane=\"{}\" \
+                     departPos=\"{at_m:.2}\" departSpeed=\"{speed:.2}\" insertionChecks=\"none\">\
+                     <route edges=\"{rest}\"/></vehicle>",
+                    lane.index
+                );
+            }
+        }
+        begin_m += length_m;
+    }
+}
+
+/// Inflow at every entry, lane by lane, split over the routes that begin there.
+fn flows(out: &mut String, config: &TrafficConfig, network: &Network, routes: &[Vec<String>]) {
+    let through = routes.first().and_then(|route| route.first());
+    for (k, route) in routes.iter().enumerate() {
+        let Some(entry) = route.first() else { continue };
+        let siblings = routes.iter().filter(|r| r.first() == Some(entry)).count();
+        let is_longest = routes.iter().position(|r| r.first() == Some(entry)) == Some(k);
+        let out_share = config.exit_share_frac.min(1.0 / siblings as f64);
+        let share = if is_longest { 1.0 - out_share * (siblings - 1) as f64 } else { out_share };
+        let probability = if Some(entry) == through {
+            config.spawn_probability
+        } else {
+            config.ramp_spawn_probability
+        };
+        // Per second, as SUMO wants it.
+        let per_s = (share * probability / config.spawn_interval_s).min(1.0);
+        if per_s <= 0.0 {
+            continue;
+        }
+        for lane in network.lanes_of(entry) {
+            let id = if k == 0 { EGO_ROUTE.to_owned() } else { format!("route{k}") };
+            let _ = writeln!(
+                out,
+                "<flow id=\"flow{k}_{}\" type=\"mix\" route=\"{id}\" begin=\"0\" end=\"{FOREVER_S}\" \
+                 probability=\"{per_s}\" departLane=\"{}\" departSpeed=\"max\"/>",
+                lane.index, lane.index
+            );
+        }
+    }
+}
