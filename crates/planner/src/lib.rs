@@ -1,1 +1,31 @@
 //! Deciders, predictive cruise control, lane-change paths, safety gate, controllers, guard.
+//!
+//! Without default features the crate is `no_std + alloc` and needs no solver. It plans with what a
+//! truck tells about itself ([`tractrix_core::VehicleLimits`]) and never sees the plant's model.
+#![cfg_attr(not(feature = "std"), no_std)]
+extern crate alloc;
+
+pub mod config;
+pub mod decider;
+mod drive;
+mod error;
+pub mod following;
+pub mod guard;
+pub mod lateral;
+pub mod lateral_model;
+mod limits_check;
+pub mod longitudinal;
+pub mod path;
+pub mod reference_speed;
+pub mod road_load;
+pub mod rss;
+mod stack;
+pub mod surroundings;
+#[cfg(test)]
+mod testing;
+
+pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};
+pub use decider::{DeciderKind, LaneChoice};
+pub use drive::{DriveError, TickOutcome, drive_tick};
+pub use error::PlannerError;
+pub use stack::Stack;

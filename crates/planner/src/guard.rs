@@ -1,0 +1,353 @@
+//! The last check before the vehicle: two pure functions over a small memory.
+//!
+//! [`inspect`] looks at what came in (finite, in range, fresh, moving, not jumping), [`limit`] at
+//! what goes out (finite, in range, not too fast, not into the vehicle ahead). Whatever is wrong
+//! with the inputs leads to the minimal-risk manoeuvre: keep the lane, accelerator off, brake with
+//! a bounded deceleration, until the inputs have been in order for a while. Every activation names
+//! its [`GuardReason`].
+
+use alloc::vec::Vec;
+
+use crate::PlannerError;
+use crate::error::config_in;
+use serde::{Deserialize, Serialize};
+use tractrix_core::{
+    BrakeMode, Command, EgoState, GearRequest, GuardReason, Stamped, Time, VehicleLimits,
+};
+
+/// Bounds of the guard.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GuardConfig {
+    /// Oldest usable ego state, s.
+    pub ego_age_max_s: f64,
+    /// Oldest usable scene, s.
+    pub scene_age_max_s: f64,
+    /// A moving truck's position may stay the same for so long, s.
+    pub frozen_max_s: f64,
+    /// Largest plausible acceleration, m/s².
+    pub accel_max_m_s2: f64,
+    /// Largest plausible jump of position beyond what the speed explains, m.
+    pub jump_max_m: f64,
+    /// Largest deceleration of the minimal-risk manoeuvre, m/s².
+    pub minimal_risk_decel_m_s2: f64,
+    /// Rate at which that deceleration is built up, m/s³.
+    pub minimal_risk_jerk_m_s3: f64,
+    /// Inputs must be in order for so long before driving goes on, s.
+    pub recovery_s: f64,
+    /// Largest rate of the hand wheel, rad/s.
+    pub wheel_rate_max_rad_s: f64,
+    /// Largest lateral acceleration that a steering command may cause, m/s².
+    pub lateral_accel_max_m_s2: f64,
+}
+
+impl Default for GuardConfig {
+    fn default() -> Self {
+        Self {
+            ego_age_max_s: 0.15,
+            scene_age_max_s: 0.5,
+            frozen_max_s: 0.3,
+            accel_max_m_s2: 12.0,
+            jump_max_m: 2.0,
+            minimal_risk_decel_m_s2: 2.5,
+            minimal_risk_jerk_m_s3: 1.5,
+            recovery_s: 0.5,
+            wheel_rate_max_rad_s: 12.0,
+            lateral_accel_max_m_s2: 3.0,
+        }
+    }
+}
+
+impl GuardConfig {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`PlannerError::Config`] names the key.
+    pub fn check(&self) -> Result<(), PlannerError> {
+        config_in("guard.ego_age_max_s", self.ego_age_max_s, 0.01, 2.0)?;
+        config_in("guard.scene_age_max_s", self.scene_age_max_s, 0.01, 5.0)?;
+        config_in("guard.frozen_max_s", self.frozen_max_s, 0.02, 5.0)?;
+        config_in("guard.accel_max_m_s2", self.accel_max_m_s2, 5.0, 100.0)?;
+        config_in("guard.jump_max_m", self.jump_max_m, 0.1, 100.0)?;
+        config_in("guard.minimal_risk_decel_m_s2", self.minimal_risk_decel_m_s2, 0.5, 6.0)?;
+        config_in("guard.minimal_risk_jerk_m_s3", self.minimal_risk_jerk_m_s3, 0.1, 50.0)?;
+        config_in("guard.recovery_s", self.recovery_s, 0.0, 10.0)?;
+        config_in("guard.wheel_rate_max_rad_s", self.wheel_rate_max_rad_s, 0.5, 50.0)?;
+        config_in("guard.lateral_accel_max_m_s2", self.lateral_accel_max_m_s2, 0.5, 10.0)
+    }
+}
+
+/// What the guard remembers between ticks.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct GuardMemory {
+    /// Last finite ego state.
+    last: Option<Stamped<EgoState>>,
+    /// When the position last changed.
+    moved: Option<Time>,
+    /// Last time at which an input was wrong.
+    wrong: Option<Time>,
+    /// Last command sent.
+    sent: Command,
+}
+
+impl GuardMemory {
+    /// The last command sent.
+    #[must_use]
+    pub fn sent(&self) -> &Command {
+        &self.sent
+    }
+}
+
+/// Verdict on the inputs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Inspection {
+    /// The ego state can be steered with.
+    pub ego_usable: bool,
+    /// The inputs, or those of a moment ago, call for the minimal-risk manoeuvre.
+    pub minimal_risk: bool,
+    /// What is wrong now, in order of detection.
+    pub reasons: Vec<GuardReason>,
+}
+
+/// Looks at the inputs of a tick. `ego` and `scene_time` are `None` when their seam failed.
+#[must_use]
+pub fn inspect(
+    config: &GuardConfig,
+    memory: &GuardMemory,
+    now: Time,
+    ego: Option<&Stamped<EgoState>>,
+    scene_time: Option<Time>,
+) -> (Inspection, GuardMemory) {
+    let mut next = *memory;
+    let mut reasons = Vec::new();
+    match ego {
+        None => reasons.push(GuardReason::Stale),
+        Some(ego) if ego.value.check_finite().is_err() => reasons.push(GuardReason::NonFinite),
+        Some(ego) => {
+            let age_s = now.seconds_since(ego.time);
+            if age_s > config.ego_age_max_s || age_s < -config.ego_age_max_s {
+                reasons.push(GuardReason::Stale);
+            }
+            if !in_range(&ego.value) {
+                reasons.push(GuardReason::Range);
+            }
+            if let Some(last) = &memory.last {
+                if jumped(config, last, ego) {
+                    reasons.push(GuardReason::Jump);
+                }
+                let v = &ego.value;
+                let same = v.s_m == last.value.s_m && v.x_m == last.value.x_m;
+                let since = memory.moved.unwrap_or(now);
+                if !same || v.speed_m_s.abs() < 0.5 {
+                    next.moved = Some(now);
+                } else if now.seconds_since(since) > config.frozen_max_s {
+                    reasons.push(GuardReason::Frozen);
+                }
+            } else {
+                next.moved = Some(now);
+            }
+            next.last = Some(*ego);
+        }
+    }
+    let ego_usable = reasons.is_empty();
+    match scene_time {
+        None => reasons.push(GuardReason::Stale),
+        Some(t) if now.seconds_since(t).abs() > config.scene_age_max_s => {
+            if !reasons.contains(&GuardReason::Stale) {
+                reasons.push(GuardReason::Stale);
+            }
+        }
+        Some(_) => {}
+    }
+    if !reasons.is_empty() {
+        next.wrong = Some(now);
+    }
+    let minimal_risk = next.wrong.is_some_and(|t| {
+        !reasons.is_empty() || now.seconds_since(t) < config.recovery_s
+    });
+    (Inspection { ego_usable, minimal_risk, reasons }, next)
+}
+
+/// Ranges that no truck leaves.
+fn in_range(ego: &EgoState) -> bool {
+    (-5.0..=60.0).contains(&ego.speed_m_s)
+        && ego.lateral_speed_m_s.abs() <= 10.0
+        && ego.accel_x_m_s2.abs() <= 30.0
+        && ego.yaw_rate_rad_s.abs() <= 3.0
+        && ego.trailer.yaw_rate_rad_s.abs() <= 3.0
+        && ego.trailer.articulation_rad.abs() <= 2.0
+        && ego.road_wheel_rad.abs() <= 1.5
+}
+
+/// More change between two states than physics allows.
+fn jumped(config: &GuardConfig, last: &Stamped<EgoState>, ego: &Stamped<EgoState>) -> bool {
+    let dt_s = ego.time.seconds_since(last.time);
+    if dt_s < 0.0 {
+        return true;
+    }
+    let (a, b) = (&last.value, &ego.value);
+    let speed = (b.speed_m_s - a.speed_m_s).abs();
+    let travel = 0.5 * (a.speed_m_s + b.speed_m_s) * dt_s;
+    let along = (b.s_m - a.s_m - travel).abs();
+    let across = (b.d_m - a.d_m).abs();
+    let turn = (b.yaw_rad - a.yaw_rad).abs() % (2.0 * core::f64::consts::PI);
+    let turn = turn.min(2.0 * core::f64::consts::PI - turn);
+    speed > 0.5 + config.accel_max_m_s2 * dt_s
+        || along > config.jump_max_m + 0.2 * travel.abs()
+        || across > 0.5 * config.jump_max_m + 5.0 * dt_s
+        || turn > 0.1 + 1.0 * dt_s
+}
+
+/// The vehicle ahead, for the headway check.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Headway {
+    /// Gap, m.
+    pub gap_m: f64,
+    /// Speed of the vehicle ahead, m/s.
+    pub speed_m_s: f64,
+    /// Acceleration of the vehicle ahead, m/s².
+    pub accel_m_s2: f64,
+}
+
+/// What [`limit`] needs besides the plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GuardInput {
+    /// Time since the last command, s.
+    pub dt_s: f64,
+    /// Last trustworthy speed, m/s.
+    pub speed_m_s: f64,
+    /// The planned command; `None` if there is no plan.
+    pub planned: Option<Command>,
+    /// Hand-wheel angle that keeps the lane as well as is known, rad.
+    pub keep_lane_wheel_rad: f64,
+    /// The inputs call for the minimal-risk manoeuvre.
+    pub minimal_risk: bool,
+    /// The vehicle ahead.
+    pub headway: Option<Headway>,
+}
+
+/// The guarded command.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Guarded {
+    /// The command to send.
+    pub command: Command,
+    /// What was changed and why, in order of detection.
+    pub reasons: Vec<GuardReason>,
+    /// The minimal-risk manoeuvre is being driven.
+    pub minimal_risk: bool,
+}
+
+/// Limits the command of a tick; total: every input gives a safe, finite command.
+#[must_use]
+pub fn limit(
+    config: &GuardConfig,
+    memory: &GuardMemory,
+    input: &GuardInput,
+    limits: &VehicleLimits,
+) -> (Guarded, GuardMemory) {
+    let mut reasons = Vec::new();
+    let planned = match &input.planned {
+        None => {
+            reasons.push(GuardReason::NoPlan);
+            None
+        }
+        Some(c) if c.check_finite().is_err() => {
+            reasons.push(GuardReason::NonFinite);
+            None
+        }
+        Some(c) => Some(*c),
+    };
+    let minimal_risk = input.minimal_risk || planned.is_none();
+    let mut command = match planned {
+        Some(c) if !minimal_risk => c,
+        _ => minimal_risk_command(config, memory, input, planned.as_ref()),
+    };
+    if in_command_range(&mut command, config, input.speed_m_s, limits) {
+        reasons.push(GuardReason::Range);
+    }
+    let step = config.wheel_rate_max_rad_s * input.dt_s;
+    let from = memory.sent.steering_wheel_rad;
+    let slow = command.steering_wheel_rad.clamp(from - step, from + step);
+    if slow != command.steering_wheel_rad {
+        command.steering_wheel_rad = slow;
+        reasons.push(GuardReason::Rate);
+    }
+    if let Some(decel_m_s2) = input.headway.and_then(|h| needs_braking(&h, input, limits)) {
+        let already = command.xbr_decel_m_s2;
+        if already < decel_m_s2 || command.accelerator_pedal_frac > 0.0 {
+            command.accelerator_pedal_frac = 0.0;
+            command.retarder_frac = 1.0;
+            command.xbr_decel_m_s2 = already.max(decel_m_s2);
+            command.brake_mode = BrakeMode::Maximum;
+            command.gear = GearRequest::Automatic;
+            reasons.push(GuardReason::Headway);
+        }
+    }
+    let next = GuardMemory { sent: command, ..*memory };
+    (Guarded { command, reasons, minimal_risk }, next)
+}
+
+/// Keep lane, accelerator off, deceleration built up to its bound and held at standstill.
+fn minimal_risk_command(
+    config: &GuardConfig,
+    memory: &GuardMemory,
+    input: &GuardInput,
+    planned: Option<&Command>,
+) -> Command {
+    let built_up = memory.sent.xbr_decel_m_s2 + config.minimal_risk_jerk_m_s3 * input.dt_s;
+    let planned_decel = planned.map_or(0.0, |c| c.xbr_decel_m_s2);
+    let decel = built_up.min(config.minimal_risk_decel_m_s2).max(planned_decel);
+    Command {
+        accelerator_pedal_frac: 0.0,
+        xbr_decel_m_s2: decel,
+        brake_mode: BrakeMode::Maximum,
+        steering_wheel_rad: planned
+            .map_or(input.keep_lane_wheel_rad, |c| c.steering_wheel_rad),
+        retarder_frac: 0.0,
+        gear: GearRequest::Automatic,
+    }
+}
+
+/// Clamps every field into its range; true if something was outside.
+fn in_command_range(
+    command: &mut Command,
+    config: &GuardConfig,
+    speed_m_s: f64,
+    limits: &VehicleLimits,
+) -> bool {
+    let before = *command;
+    let l = &limits.lateral;
+    // Steady turn: a_y = v² delta / wheelbase at most; keeps a wrong command from rolling the truck
+    let v2 = (speed_m_s * speed_m_s).max(1.0);
+    let by_accel = config.lateral_accel_max_m_s2 * limits.geometry.wheelbase_m.max(1.0) / v2;
+    let wheel = l.max_road_wheel_rad.min(by_accel).max(0.0) * l.steering_ratio.abs().max(1.0);
+    let wheel = if wheel.is_finite() { wheel } else { 0.0 };
+    let hardest = if limits.brakes.max_decel_m_s2 > 0.0 {
+        limits.brakes.max_decel_m_s2.max(config.minimal_risk_decel_m_s2).min(12.5)
+    } else {
+        config.minimal_risk_decel_m_s2
+    };
+    command.accelerator_pedal_frac = command.accelerator_pedal_frac.clamp(0.0, 1.0);
+    command.retarder_frac = command.retarder_frac.clamp(0.0, 1.0);
+    command.xbr_decel_m_s2 = command.xbr_decel_m_s2.clamp(0.0, hardest);
+    command.steering_wheel_rad = command.steering_wheel_rad.clamp(-wheel, wheel);
+    if command.xbr_decel_m_s2 > 0.0 && command.brake_mode == BrakeMode::Off {
+        command.brake_mode = BrakeMode::Maximum;
+    }
+    *command != before
+}
+
+/// Deceleration that avoids the vehicle ahead with the brakes' full force, if coasting on would hit
+/// it: both vehicles keep their deceleration to standstill.
+fn needs_braking(h: &Headway, input: &GuardInput, limits: &VehicleLimits) -> Option<f64> {
+    let b = &limits.brakes;
+    let hardest = b.max_decel_m_s2.max(0.5);
+    let v = input.speed_m_s.max(0.0);
+    let ahead = (-h.accel_m_s2).max(1.0);
+    let v_f = h.speed_m_s.max(0.0);
+    let delay = b.dead_time_s + 0.5 * b.build_up_s;
+    let closing = v - v_f;
+    let stop = v * delay + v * v / (2.0 * hardest) - v_f * v_f / (2.0 * ahead.min(hardest));
+    let hits = h.gap_m < stop.max(0.0) && closing > 0.5 || h.gap_m < 1.0 && v > 0.2;
+    hits.then_some(hardest)
+}

@@ -1,0 +1,97 @@
+//! The reference speed ahead (the paper's `Query_Reference_Speed`): set speed, speed limits and
+//! curves, with a comfortable deceleration towards whatever is lower ahead.
+//!
+//! A limit or curve holds until the whole combination has left it.
+
+use alloc::vec::Vec;
+
+use road::{ProfilePoint, Road};
+use tractrix_core::{Geometry, SpeedPoint};
+
+/// Spacing of the reference, m.
+pub const STEP_M: f64 = 10.0;
+/// Points of the reference: 500 m ahead.
+pub const POINTS: usize = 51;
+/// Deceleration towards lower limits ahead, m/s².
+const APPROACH_DECEL_M_S2: f64 = 0.5;
+
+/// What bounds the reference speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedBounds {
+    /// Set speed, m/s.
+    pub set_speed_m_s: f64,
+    /// Speed limits of the road count.
+    pub obey_speed_limits: bool,
+    /// Largest lateral acceleration in curves, m/s².
+    pub curve_accel_m_s2: f64,
+}
+
+/// Speed reference from a station on.
+#[derive(Debug, Clone, Default)]
+pub struct ReferenceSpeed {
+    points: Vec<SpeedPoint>,
+    profile: Vec<ProfilePoint>,
+}
+
+impl ReferenceSpeed {
+    /// Recomputes the reference from `s_m` on, in `lane`. `planned` is the predictive planner's
+    /// speed at a station where it has one; it replaces the set speed.
+    pub fn update(
+        &mut self,
+        road: &Road,
+        lane: u16,
+        s_m: f64,
+        geometry: &Geometry,
+        bounds: &SpeedBounds,
+        planned: impl Fn(f64) -> Option<f64>,
+    ) {
+        let behind = libm::ceil(geometry.length_m() / STEP_M).clamp(0.0, 10.0) as usize;
+        self.profile.clear();
+        self.profile.resize(POINTS + behind, ProfilePoint::default());
+        road.profile(s_m - behind as f64 * STEP_M, STEP_M, &mut self.profile);
+        let cap = |p: &ProfilePoint| {
+            let curve = libm::sqrt(bounds.curve_accel_m_s2 / p.curvature_1_m.abs().max(1e-6));
+            let limit = if bounds.obey_speed_limits {
+                road.lane_speed_limit_m_s(lane, p.s_m)
+            } else {
+                f64::INFINITY
+            };
+            curve.min(limit)
+        };
+        self.points.clear();
+        self.points.extend((0..POINTS).map(|i| {
+            let s = s_m + i as f64 * STEP_M;
+            let held = self.profile[i..=i + behind].iter().map(cap).fold(f64::INFINITY, f64::min);
+            let wanted = planned(s).unwrap_or(bounds.set_speed_m_s);
+            SpeedPoint { s_m: s, speed_m_s: wanted.min(held), accel_m_s2: 0.0 }
+        }));
+        for i in (0..POINTS - 1).rev() {
+            let ahead = self.points[i + 1].speed_m_s;
+            let reachable = libm::sqrt(ahead * ahead + 2.0 * APPROACH_DECEL_M_S2 * STEP_M);
+            let here = self.points[i].speed_m_s.min(reachable);
+            self.points[i].speed_m_s = here;
+            self.points[i].accel_m_s2 = (ahead * ahead - here * here) / (2.0 * STEP_M);
+        }
+    }
+
+    /// Reference speed, m/s, and acceleration, m/s², at a station; rises are not fed forward beyond
+    /// 0.3 m/s². `None` before the first update.
+    #[must_use]
+    pub fn at(&self, s_m: f64) -> Option<(f64, f64)> {
+        let first = self.points.first()?;
+        let x = ((s_m - first.s_m) / STEP_M).clamp(0.0, (self.points.len() - 1) as f64);
+        let i = (x as usize).min(self.points.len() - 2);
+        let (p, q) = (&self.points[i], &self.points[i + 1]);
+        let f = x - i as f64;
+        // Kinetic energy is linear between the points, so that the acceleration is constant there.
+        let v2 = p.speed_m_s * p.speed_m_s
+            + f * (q.speed_m_s * q.speed_m_s - p.speed_m_s * p.speed_m_s);
+        Some((libm::sqrt(v2.max(0.0)), p.accel_m_s2.clamp(-2.0 * APPROACH_DECEL_M_S2, 0.3)))
+    }
+
+    /// The points.
+    #[must_use]
+    pub fn points(&self) -> &[SpeedPoint] {
+        &self.points
+    }
+}

@@ -1,0 +1,130 @@
+//! Inverse model of the powertrain: from a wanted acceleration to a force, from a force to a pedal,
+//! with what [`VehicleLimits`] tells (the paper's Eq. 20, sorted into forces).
+//!
+//! Left out: torque build-up, shifting and temperature; the speed controller's feedback covers them.
+
+use tractrix_core::{GRAVITY_M_S2, PowertrainLimits, RoadLoad, VehicleLimits};
+
+/// Force that resists motion, N: grade, rolling and air at `speed_m_s` (no wind), grade in rad.
+#[must_use]
+pub fn resistance_n(load: &RoadLoad, speed_m_s: f64, grade_rad: f64) -> f64 {
+    let weight_n = load.mass_kg * GRAVITY_M_S2;
+    let air_n = 0.5 * load.air_density_kg_m3 * load.cd_a_m2 * speed_m_s * speed_m_s.abs();
+    weight_n * (libm::sin(grade_rad) + load.rolling_coeff * libm::cos(grade_rad)) + air_n
+}
+
+/// The driveline in one gear.
+#[derive(Debug, Clone, Copy)]
+pub struct InGear<'a> {
+    powertrain: &'a PowertrainLimits,
+    /// Crank torque to wheel force, 1/m.
+    leverage_1_m: f64,
+    efficiency_frac: f64,
+    /// Engine speed, rad/s, not below idle and not above the governed speed.
+    pub engine_speed_rad_s: f64,
+    /// Rotating inertia felt as mass, kg.
+    pub rotating_mass_kg: f64,
+}
+
+impl<'a> InGear<'a> {
+    /// The driveline in `gear` (1-based) at `speed_m_s`. Neutral and unknown gears are read as the
+    /// gear that a gearbox would choose: the highest with at least 1.5 times idle speed.
+    #[must_use]
+    pub fn new(powertrain: &'a PowertrainLimits, gear: u8, speed_m_s: f64) -> Self {
+        let count = powertrain.gear_ratios.len().max(1);
+        let per_speed = powertrain.final_drive_ratio / powertrain.wheel_radius_m;
+        let ratio = |i: usize| powertrain.gear_ratios.get(i).copied().unwrap_or(1.0);
+        let index = if gear >= 1 && usize::from(gear) <= count {
+            usize::from(gear) - 1
+        } else {
+            (0..count)
+                .rev()
+                .find(|&i| {
+                    speed_m_s * per_speed * ratio(i) >= 1.5 * powertrain.idle_speed_rad_s
+                })
+                .unwrap_or(0)
+        };
+        let leverage_1_m = per_speed * ratio(index);
+        Self {
+            powertrain,
+            leverage_1_m,
+            efficiency_frac: powertrain.gear_efficiency_frac.get(index).copied().unwrap_or(1.0),
+            engine_speed_rad_s: (speed_m_s * leverage_1_m)
+                .clamp(powertrain.idle_speed_rad_s, powertrain.max_speed_rad_s),
+            rotating_mass_kg: powertrain.rotating_mass_kg.get(index).copied().unwrap_or(0.0),
+        }
+    }
+
+    /// Friction and auxiliaries at the crank, Nm, positive.
+    #[must_use]
+    pub fn loss_nm(&self) -> f64 {
+        self.powertrain.friction_nm.at(self.engine_speed_rad_s)
+            + self.powertrain.auxiliary_power_w / self.engine_speed_rad_s.max(1.0)
+    }
+
+    /// Wheel force of a net crank torque, N; losses act against the flow of power.
+    #[must_use]
+    pub fn force_n(&self, net_nm: f64) -> f64 {
+        let force = net_nm * self.leverage_1_m;
+        if net_nm >= 0.0 { force * self.efficiency_frac } else { force / self.efficiency_frac }
+    }
+
+    /// Net crank torque for a wheel force, Nm.
+    #[must_use]
+    pub fn net_torque_nm(&self, force_n: f64) -> f64 {
+        let torque = force_n / self.leverage_1_m;
+        if force_n >= 0.0 { torque / self.efficiency_frac } else { torque * self.efficiency_frac }
+    }
+
+    /// Wheel force without fuel, N (negative).
+    #[must_use]
+    pub fn coast_force_n(&self) -> f64 {
+        self.force_n(-self.loss_nm())
+    }
+
+    /// Largest wheel force, N.
+    #[must_use]
+    pub fn max_force_n(&self) -> f64 {
+        let aux_nm = self.powertrain.auxiliary_power_w / self.engine_speed_rad_s.max(1.0);
+        self.force_n(self.powertrain.full_load_nm.at(self.engine_speed_rad_s) - aux_nm)
+    }
+
+    /// Largest additional braking force of engine brake and retarder, N, positive.
+    #[must_use]
+    pub fn max_retarder_force_n(&self) -> f64 {
+        self.powertrain.engine_brake_nm.at(self.engine_speed_rad_s) * self.leverage_1_m
+            / self.efficiency_frac
+    }
+
+    /// Accelerator pedal, 0 to 1, that gives the wheel force, by inverting the pedal map.
+    #[must_use]
+    pub fn pedal_frac(&self, force_n: f64) -> f64 {
+        let indicated_nm = self.net_torque_nm(force_n) + self.loss_nm();
+        if indicated_nm <= 0.0 {
+            return 0.0;
+        }
+        let speed = self.engine_speed_rad_s;
+        let Some(map) = &self.powertrain.pedal_map_nm else {
+            let full =
+                self.powertrain.full_load_nm.at(speed) + self.powertrain.friction_nm.at(speed);
+            return (indicated_nm / full.max(1.0)).clamp(0.0, 1.0);
+        };
+        // Indicated torque grows with the pedal: bisection to 1/4096, finer than the bus's 0.4 %.
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..12 {
+            let mid = 0.5 * (low + high);
+            if map.at(mid, speed) < indicated_nm {
+                low = mid;
+            } else {
+                high = mid;
+            }
+        }
+        0.5 * (low + high)
+    }
+}
+
+/// Mass that the wheels have to accelerate in this gear, kg.
+#[must_use]
+pub fn effective_mass_kg(limits: &VehicleLimits, in_gear: &InGear<'_>) -> f64 {
+    limits.road_load.mass_kg + in_gear.rotating_mass_kg
+}

@@ -1,0 +1,353 @@
+//! The planning stack: decide, plan speed, plan path, control, guard.
+
+use alloc::vec::Vec;
+
+use crate::decider::LaneChoice;
+use crate::following::{Following, Lead, follow};
+use crate::guard::{GuardInput, GuardMemory, Headway, inspect, limit};
+use crate::lateral::{LateralController, PREVIEW_POINTS, PREVIEW_STEP_S, PathError};
+use crate::lateral_model::LOWEST_SPEED_M_S;
+use crate::limits_check::check_limits;
+use crate::longitudinal::{LongitudinalController, SpeedTarget};
+use crate::path::LateralPath;
+use crate::reference_speed::{ReferenceSpeed, SpeedBounds};
+use crate::surroundings::{EgoExtent, ahead, in_lane};
+use crate::{PlannerError, StackConfig};
+use road::{LaneKind, Road};
+use tractrix_core::{
+    Command, EgoState, GearRequest, Maneuver, Plan, PlanStatus, Scene, Stamped, Time, VehicleLimits,
+};
+
+/// Spacing of the published path, s, and its number of points.
+const PATH_STEP_S: f64 = 0.2;
+const PATH_POINTS: usize = 26;
+
+/// The planning stack of one truck.
+#[derive(Debug, Clone)]
+pub struct Stack {
+    config: StackConfig,
+    lateral: LateralController,
+    longitudinal: LongitudinalController,
+    reference: ReferenceSpeed,
+    guard: GuardMemory,
+    path: Option<LateralPath>,
+    ticks: u64,
+    last_tick: Option<Time>,
+    /// Last trustworthy state, moved on by dead reckoning while there is no other.
+    believed: EgoState,
+    wish: LaneChoice,
+    plan: Plan,
+}
+
+impl Stack {
+    /// A stack for a truck.
+    ///
+    /// # Errors
+    /// [`PlannerError`] names the configuration key or the vehicle's value that cannot be used.
+    pub fn new(config: StackConfig, limits: &VehicleLimits) -> Result<Self, PlannerError> {
+        config.check()?;
+        check_limits(limits)?;
+        let lateral = LateralController::new(config.lateral, limits, config.rates.control_s())?;
+        Ok(Self {
+            lateral,
+            longitudinal: LongitudinalController::new(config.longitudinal),
+            reference: ReferenceSpeed::default(),
+            guard: GuardMemory::default(),
+            path: None,
+            ticks: 0,
+            last_tick: None,
+            believed: EgoState::default(),
+            wish: LaneChoice::Keep,
+            plan: Plan::default(),
+            config,
+        })
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &StackConfig {
+        &self.config
+    }
+
+    /// The latest plan.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Sets the driver's set speed, m/s, clamped to 0..40; a non-finite value is ignored.
+    pub fn set_speed(&mut self, speed_m_s: f64) {
+        if speed_m_s.is_finite() {
+            self.config.set_speed_m_s = speed_m_s.clamp(0.0, 40.0);
+        }
+    }
+
+    /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick.
+    pub fn request_lane_change(&mut self, wish: LaneChoice) {
+        self.wish = wish;
+    }
+
+    /// One tick: the plan for `[now, next tick)`, its command guarded. Never fails: what is wrong
+    /// with the inputs is in the plan's guard reasons.
+    pub fn tick(
+        &mut self,
+        now: Time,
+        ego: &Stamped<EgoState>,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> &Plan {
+        self.run(now, Some(ego), Some(scene), road, limits)
+    }
+
+    /// One tick without a scene, or without ego state and scene, because a seam failed: the
+    /// minimal-risk manoeuvre.
+    pub fn minimal_risk(
+        &mut self,
+        now: Time,
+        ego: Option<&Stamped<EgoState>>,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> &Plan {
+        self.run(now, ego, None, road, limits)
+    }
+
+    fn run(
+        &mut self,
+        now: Time,
+        ego: Option<&Stamped<EgoState>>,
+        scene: Option<&Scene>,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> &Plan {
+        let dt_s = self
+            .last_tick
+            .map_or(self.config.rates.tick_s, |t| now.seconds_since(t))
+            .clamp(0.0, 0.5);
+        self.last_tick = Some(now);
+        let (inspection, memory) =
+            inspect(&self.config.guard, &self.guard, now, ego, scene.map(|s| s.time));
+        self.guard = memory;
+        match ego {
+            Some(ego) if inspection.ego_usable => self.believed = ego.value,
+            _ => self.dead_reckon(dt_s, road),
+        }
+        let ego = self.believed;
+        let empty = Scene::default();
+        let scene = scene.unwrap_or(&empty);
+
+        self.plan.guard.clear();
+        self.plan.guard.extend_from_slice(&inspection.reasons);
+        self.plan.refusal = None;
+        let planned = if inspection.ego_usable {
+            self.drive(&ego, scene, road, limits)
+        } else {
+            None
+        };
+        let curvature = road.line().at(ego.s_m).curvature_1_m;
+        let steady = self.lateral.steady_road_wheel_rad(
+            curvature,
+            ego.speed_m_s,
+            limits.road_load.mass_kg,
+        );
+        let input = GuardInput {
+            dt_s,
+            speed_m_s: ego.speed_m_s,
+            planned,
+            keep_lane_wheel_rad: steady * limits.lateral.steering_ratio,
+            minimal_risk: inspection.minimal_risk,
+            headway: self.headway(&ego, scene, road, limits),
+        };
+        let (guarded, memory) = limit(&self.config.guard, &self.guard, &input, limits);
+        self.guard = memory;
+        for reason in guarded.reasons {
+            if !self.plan.guard.contains(&reason) {
+                self.plan.guard.push(reason);
+            }
+        }
+        self.plan.command = guarded.command;
+        if guarded.minimal_risk {
+            self.plan.maneuver = Maneuver::MinimalRisk;
+            self.lateral
+                .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);
+        }
+        self.ticks = self.ticks.wrapping_add(1);
+        &self.plan
+    }
+
+    /// Decide, plan and control with trustworthy inputs; `None` if there is no lane to drive in.
+    fn drive(
+        &mut self,
+        ego: &EgoState,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> Option<Command> {
+        let rates = self.config.rates;
+        let due = |every: u32| self.ticks.is_multiple_of(u64::from(every));
+        let path = match self.path {
+            Some(path) => path,
+            None => LateralPath::keep(start_lane(road, ego)?),
+        };
+        self.path = Some(path);
+        self.plan.maneuver = Maneuver::KeepLane;
+        self.plan.lane = path.lane;
+
+        if due(rates.path_ticks) || self.reference.points().is_empty() {
+            let bounds = SpeedBounds {
+                set_speed_m_s: self.config.set_speed_m_s,
+                obey_speed_limits: self.config.obey_speed_limits,
+                curve_accel_m_s2: self.config.curve_accel_m_s2,
+            };
+            self.reference.update(road, path.lane, ego.s_m, &limits.geometry, &bounds, |_| None);
+            self.plan.speed.clear();
+            self.plan.speed.extend_from_slice(self.reference.points());
+            self.plan.speed_status = PlanStatus::Cruise;
+            publish_path(&mut self.plan.path, &path, road, ego);
+        }
+        if !due(rates.control_ticks) {
+            return Some(*self.guard.sent());
+        }
+        let dt_s = rates.control_s();
+        let grade_rad = grade(road, ego, limits);
+        let following = self.follow(ego, scene, road, limits, grade_rad);
+        let (speed_m_s, accel_m_s2) = self.reference.at(ego.s_m)?;
+        let target = SpeedTarget {
+            speed_m_s,
+            accel_m_s2,
+            traffic_accel_m_s2: following.map_or(f64::INFINITY, |(_, f)| f.accel_m_s2),
+            grade_rad,
+        };
+        let speed = self.longitudinal.step(dt_s, ego, &target, limits);
+
+        let (error, wheel_rad) = self.steer(ego, &path, road, limits);
+        self.plan.following = following.map(|(id, _)| id);
+        self.plan.reference_speed_m_s = speed_m_s;
+        self.plan.target_speed_m_s = speed_m_s;
+        self.plan.target_accel_m_s2 = speed.accel_m_s2;
+        self.plan.target_d_m = ego.d_m - error.offset_m;
+        self.plan.lateral_error_m = error.offset_m;
+        Some(Command {
+            accelerator_pedal_frac: speed.accelerator_pedal_frac,
+            xbr_decel_m_s2: speed.xbr_decel_m_s2,
+            brake_mode: speed.brake_mode,
+            steering_wheel_rad: wheel_rad * limits.lateral.steering_ratio,
+            retarder_frac: speed.retarder_frac,
+            gear: GearRequest::Automatic,
+        })
+    }
+
+    fn steer(
+        &mut self,
+        ego: &EgoState,
+        path: &LateralPath,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> (PathError, f64) {
+        let here = path.at(road, ego.s_m);
+        let (angle, _) = path.direction(road, ego.s_m);
+        let heading = road.line().at(ego.s_m).heading_rad + angle;
+        let error = PathError {
+            offset_m: ego.d_m - here.d_m,
+            heading_rad: wrapped(ego.yaw_rad - heading),
+        };
+        let step_m = ego.speed_m_s.max(LOWEST_SPEED_M_S) * PREVIEW_STEP_S;
+        let mut curvature = [0.0; PREVIEW_POINTS];
+        for (i, k) in curvature.iter_mut().enumerate() {
+            *k = path.direction(road, ego.s_m + i as f64 * step_m).1;
+        }
+        (error, self.lateral.step(ego, error, &curvature, limits))
+    }
+
+    /// Car following behind the nearest vehicle in the lane.
+    fn follow(
+        &self,
+        ego: &EgoState,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+        grade_rad: f64,
+    ) -> Option<(u64, Following)> {
+        let lead = self.lead(ego, scene, road, limits)?;
+        let response = self.config.rss.ego_response(limits);
+        let f = follow(&self.config.following, &response, ego.speed_m_s, grade_rad, &lead);
+        Some((lead.id, f))
+    }
+
+    fn lead(
+        &self,
+        ego: &EgoState,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> Option<Lead> {
+        let lane = self.path?.lane;
+        let extent = EgoExtent::new(ego, &limits.geometry);
+        let n = ahead(scene, &extent, |n| in_lane(road, lane, n, extent.width_m))?;
+        Some(Lead {
+            id: n.id,
+            gap_m: n.rear_s_m - extent.front_s_m,
+            speed_m_s: n.speed_m_s,
+            accel_m_s2: n.accel_m_s2,
+            brake_max_m_s2: self.config.rss.brake_max_m_s2(n.class),
+        })
+    }
+
+    fn headway(
+        &self,
+        ego: &EgoState,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> Option<Headway> {
+        let lead = self.lead(ego, scene, road, limits)?;
+        Some(Headway {
+            gap_m: lead.gap_m,
+            speed_m_s: lead.speed_m_s,
+            accel_m_s2: lead.accel_m_s2,
+        })
+    }
+
+    /// Moves the believed state along the road with the deceleration that was commanded.
+    fn dead_reckon(&mut self, dt_s: f64, road: &Road) {
+        let e = &mut self.believed;
+        let before = road.line().at(e.s_m).heading_rad;
+        let decel = self.guard.sent().xbr_decel_m_s2;
+        e.speed_m_s = (e.speed_m_s - decel * dt_s).max(0.0);
+        e.s_m += e.speed_m_s * dt_s;
+        e.yaw_rad += road.line().at(e.s_m).heading_rad - before;
+    }
+}
+
+/// The lane to start in: the one that the truck is in, or the nearest drivable one.
+fn start_lane(road: &Road, ego: &EgoState) -> Option<u16> {
+    road.lanes_at(ego.s_m)
+        .filter(|l| l.kind != LaneKind::Shoulder)
+        .min_by(|a, b| {
+            let off = |l: &road::LaneTrack| (l.center_d_m(ego.s_m) - ego.d_m).abs();
+            off(a).total_cmp(&off(b))
+        })
+        .map(|l| l.id)
+}
+
+/// Mean grade under the combination, rad.
+fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
+    let g = &limits.geometry;
+    let length = g.length_m().max(1.0);
+    let front = road.at(ego.s_m + g.front_m, 0.0).z_m;
+    let rear = road.at(ego.s_m - g.rear_m(), 0.0).z_m;
+    libm::atan((front - rear) / length)
+}
+
+fn publish_path(out: &mut Vec<tractrix_core::PathPoint>, path: &LateralPath, road: &Road, ego: &EgoState) {
+    let step_m = ego.speed_m_s.max(1.0) * PATH_STEP_S;
+    out.clear();
+    out.extend((0..PATH_POINTS).map(|i| {
+        path.point(road, ego.s_m + i as f64 * step_m, i as f64 * PATH_STEP_S)
+    }));
+}
+
+/// Angle in -pi..pi.
+fn wrapped(angle_rad: f64) -> f64 {
+    libm::remainder(angle_rad, 2.0 * core::f64::consts::PI)
+}
