@@ -162,9 +162,8 @@ pub fn inspect(
     if !reasons.is_empty() {
         next.wrong = Some(now);
     }
-    let minimal_risk = next.wrong.is_some_and(|t| {
-        !reasons.is_empty() || now.seconds_since(t) < config.recovery_s
-    });
+    let minimal_risk =
+        next.wrong.is_some_and(|t| !reasons.is_empty() || now.seconds_since(t) < config.recovery_s);
     (Inspection { ego_usable, minimal_risk, reasons }, next)
 }
 
@@ -301,8 +300,7 @@ fn minimal_risk_command(
         accelerator_pedal_frac: 0.0,
         xbr_decel_m_s2: decel,
         brake_mode: BrakeMode::Maximum,
-        steering_wheel_rad: planned
-            .map_or(input.keep_lane_wheel_rad, |c| c.steering_wheel_rad),
+        steering_wheel_rad: planned.map_or(input.keep_lane_wheel_rad, |c| c.steering_wheel_rad),
         retarder_frac: 0.0,
         gear: GearRequest::Automatic,
     }

@@ -119,14 +119,9 @@ impl LateralController {
             let lateral = with_trailer_mass(&limits.lateral, &limits.geometry, factor);
             *mass = lateral.tractor_mass_kg + lateral.trailer_mass_kg;
             for speed_m_s in SPEEDS_M_S {
-                grid.push(
-                    grid_point(&config, &lateral, &limits.geometry, speed_m_s, dt_s).ok_or(
-                        PlannerError::Riccati {
-                            speed_m_s,
-                            trailer_mass_kg: lateral.trailer_mass_kg,
-                        },
-                    )?,
-                );
+                grid.push(grid_point(&config, &lateral, &limits.geometry, speed_m_s, dt_s).ok_or(
+                    PlannerError::Riccati { speed_m_s, trailer_mass_kg: lateral.trailer_mass_kg },
+                )?);
             }
         }
         let steps = libm::round(config.delay_s / dt_s) as usize;
@@ -162,9 +157,8 @@ impl LateralController {
             ego.road_wheel_rad,
         ]);
         for &u in &self.pending_rad {
-            x = self.blend(&weights, |p| {
-                p.model.a * x + p.model.b * u + p.model.e * curvature_1_m[0]
-            });
+            x = self
+                .blend(&weights, |p| p.model.a * x + p.model.b * u + p.model.e * curvature_1_m[0]);
         }
         let kappa = curvature_1_m[0];
         let command = self.blend_scalar(&weights, |p| {

@@ -4,6 +4,8 @@
 //! truck tells about itself ([`tractrix_core::VehicleLimits`]) and never sees the plant's model.
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
+#[cfg(test)]
+extern crate std;
 
 pub mod config;
 pub mod decider;
@@ -22,6 +24,7 @@ pub mod rss;
 mod stack;
 pub mod surroundings;
 #[cfg(test)]
+#[path = "../tests/support/data_sheet.rs"]
 mod testing;
 
 pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};

@@ -7,7 +7,7 @@ use tractrix_core::VehicleLimits;
 ///
 /// # Errors
 /// [`PlannerError::Limits`] or [`PlannerError::Gears`] names what is wrong.
-pub fn check_limits(limits: &VehicleLimits) -> Result<(), PlannerError> {
+pub(crate) fn check_limits(limits: &VehicleLimits) -> Result<(), PlannerError> {
     let p = &limits.powertrain;
     let gears = p.gear_ratios.len();
     if gears == 0 || p.gear_efficiency_frac.len() != gears || p.rotating_mass_kg.len() != gears {
@@ -19,7 +19,8 @@ pub fn check_limits(limits: &VehicleLimits) -> Result<(), PlannerError> {
     }
     let (g, r, b, l) = (&limits.geometry, &limits.road_load, &limits.brakes, &limits.lateral);
     let gear_ratio = |i: usize| ("powertrain.gear_ratios", p.gear_ratios[i], 0.1, 100.0);
-    let gear_eff = |i: usize| ("powertrain.gear_efficiency_frac", p.gear_efficiency_frac[i], 0.1, 1.0);
+    let gear_eff =
+        |i: usize| ("powertrain.gear_efficiency_frac", p.gear_efficiency_frac[i], 0.1, 1.0);
     let gear_mass = |i: usize| ("powertrain.rotating_mass_kg", p.rotating_mass_kg[i], 0.0, 1e6);
     let gear_rows = (0..gears).flat_map(|i| [gear_ratio(i), gear_eff(i), gear_mass(i)]);
     let rows = [

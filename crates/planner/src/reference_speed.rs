@@ -84,8 +84,8 @@ impl ReferenceSpeed {
         let (p, q) = (&self.points[i], &self.points[i + 1]);
         let f = x - i as f64;
         // Kinetic energy is linear between the points, so that the acceleration is constant there.
-        let v2 = p.speed_m_s * p.speed_m_s
-            + f * (q.speed_m_s * q.speed_m_s - p.speed_m_s * p.speed_m_s);
+        let v2 =
+            p.speed_m_s * p.speed_m_s + f * (q.speed_m_s * q.speed_m_s - p.speed_m_s * p.speed_m_s);
         Some((libm::sqrt(v2.max(0.0)), p.accel_m_s2.clamp(-2.0 * APPROACH_DECEL_M_S2, 0.3)))
     }
 

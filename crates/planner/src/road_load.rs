@@ -39,9 +39,7 @@ impl<'a> InGear<'a> {
         } else {
             (0..count)
                 .rev()
-                .find(|&i| {
-                    speed_m_s * per_speed * ratio(i) >= 1.5 * powertrain.idle_speed_rad_s
-                })
+                .find(|&i| speed_m_s * per_speed * ratio(i) >= 1.5 * powertrain.idle_speed_rad_s)
                 .unwrap_or(0)
         };
         let leverage_1_m = per_speed * ratio(index);

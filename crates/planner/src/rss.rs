@@ -62,11 +62,7 @@ impl Default for RssConfig {
             ego_brake_max_m_s2: 6.0,
             car_brake_max_m_s2: 8.0,
             truck_brake_max_m_s2: 6.0,
-            car_behind: RearResponse {
-                reaction_s: 1.2,
-                accel_max_m_s2: 1.5,
-                brake_min_m_s2: 4.0,
-            },
+            car_behind: RearResponse { reaction_s: 1.2, accel_max_m_s2: 1.5, brake_min_m_s2: 4.0 },
             truck_behind: RearResponse {
                 reaction_s: 1.3,
                 accel_max_m_s2: 0.4,
@@ -150,8 +146,8 @@ pub fn safe_gap_m(
     let b_r = brake_on_grade_m_s2(rear.brake_min_m_s2, grade_rad);
     let b_f = brake_on_grade_m_s2(front_brake_m_s2, grade_rad);
     let v_after = v_r + rho * a;
-    let d = v_r * rho + 0.5 * a * rho * rho + v_after * v_after / (2.0 * b_r)
-        - v_f * v_f / (2.0 * b_f);
+    let d =
+        v_r * rho + 0.5 * a * rho * rho + v_after * v_after / (2.0 * b_r) - v_f * v_f / (2.0 * b_f);
     d.max(0.0)
 }
 
@@ -188,9 +184,13 @@ mod tests {
 
     #[test]
     fn the_gaps_equal_the_published_figures_for_a_loaded_truck_behind_a_car() {
-        for (v_r, v_f, gap) in
-            [(16.7, 12.5, 48.0), (16.7, 16.7, 41.0), (20.0, 15.0, 65.0), (20.0, 20.0, 54.0), (25.0, 20.0, 92.0)]
-        {
+        for (v_r, v_f, gap) in [
+            (16.7, 12.5, 48.0),
+            (16.7, 16.7, 41.0),
+            (20.0, 15.0, 65.0),
+            (20.0, 20.0, 54.0),
+            (25.0, 20.0, 92.0),
+        ] {
             let d = safe_gap_m(v_r, v_f, &loaded(), 8.0, 0.0);
             assert!((d - gap).abs() < 1.0, "{v_r}/{v_f}: {d}");
         }

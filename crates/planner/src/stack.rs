@@ -9,7 +9,7 @@ use crate::lateral::{LateralController, PREVIEW_POINTS, PREVIEW_STEP_S, PathErro
 use crate::lateral_model::LOWEST_SPEED_M_S;
 use crate::limits_check::check_limits;
 use crate::longitudinal::{LongitudinalController, SpeedTarget};
-use crate::path::LateralPath;
+use crate::path::{Lateral, LateralPath};
 use crate::reference_speed::{ReferenceSpeed, SpeedBounds};
 use crate::surroundings::{EgoExtent, ahead, in_lane};
 use crate::{PlannerError, StackConfig};
@@ -21,6 +21,8 @@ use tractrix_core::{
 /// Spacing of the published path, s, and its number of points.
 const PATH_STEP_S: f64 = 0.2;
 const PATH_POINTS: usize = 26;
+/// Time for joining a lane's centre from beside it, s.
+const JOIN_S: f64 = 6.0;
 
 /// The planning stack of one truck.
 #[derive(Debug, Clone)]
@@ -139,17 +141,11 @@ impl Stack {
         self.plan.guard.clear();
         self.plan.guard.extend_from_slice(&inspection.reasons);
         self.plan.refusal = None;
-        let planned = if inspection.ego_usable {
-            self.drive(&ego, scene, road, limits)
-        } else {
-            None
-        };
+        let planned =
+            if inspection.ego_usable { self.drive(&ego, scene, road, limits) } else { None };
         let curvature = road.line().at(ego.s_m).curvature_1_m;
-        let steady = self.lateral.steady_road_wheel_rad(
-            curvature,
-            ego.speed_m_s,
-            limits.road_load.mass_kg,
-        );
+        let steady =
+            self.lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);
         let input = GuardInput {
             dt_s,
             speed_m_s: ego.speed_m_s,
@@ -167,6 +163,7 @@ impl Stack {
         }
         self.plan.command = guarded.command;
         if guarded.minimal_risk {
+            self.path = None;
             self.plan.maneuver = Maneuver::MinimalRisk;
             self.lateral
                 .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);
@@ -187,7 +184,7 @@ impl Stack {
         let due = |every: u32| self.ticks.is_multiple_of(u64::from(every));
         let path = match self.path {
             Some(path) => path,
-            None => LateralPath::keep(start_lane(road, ego)?),
+            None => join_from(road, start_lane(road, ego)?, ego),
         };
         self.path = Some(path);
         self.plan.maneuver = Maneuver::KeepLane;
@@ -247,10 +244,8 @@ impl Stack {
         let here = path.at(road, ego.s_m);
         let (angle, _) = path.direction(road, ego.s_m);
         let heading = road.line().at(ego.s_m).heading_rad + angle;
-        let error = PathError {
-            offset_m: ego.d_m - here.d_m,
-            heading_rad: wrapped(ego.yaw_rad - heading),
-        };
+        let error =
+            PathError { offset_m: ego.d_m - here.d_m, heading_rad: wrapped(ego.yaw_rad - heading) };
         let step_m = ego.speed_m_s.max(LOWEST_SPEED_M_S) * PREVIEW_STEP_S;
         let mut curvature = [0.0; PREVIEW_POINTS];
         for (i, k) in curvature.iter_mut().enumerate() {
@@ -301,11 +296,7 @@ impl Stack {
         limits: &VehicleLimits,
     ) -> Option<Headway> {
         let lead = self.lead(ego, scene, road, limits)?;
-        Some(Headway {
-            gap_m: lead.gap_m,
-            speed_m_s: lead.speed_m_s,
-            accel_m_s2: lead.accel_m_s2,
-        })
+        Some(Headway { gap_m: lead.gap_m, speed_m_s: lead.speed_m_s, accel_m_s2: lead.accel_m_s2 })
     }
 
     /// Moves the believed state along the road with the deceleration that was commanded.
@@ -330,6 +321,15 @@ fn start_lane(road: &Road, ego: &EgoState) -> Option<u16> {
         .map(|l| l.id)
 }
 
+/// From where the truck is to the lane's centre, within [`JOIN_S`].
+fn join_from(road: &Road, lane: u16, ego: &EgoState) -> LateralPath {
+    let heading = wrapped(ego.yaw_rad - road.line().at(ego.s_m).heading_rad);
+    let here =
+        Lateral { d_m: ego.d_m, slope: libm::tan(heading.clamp(-0.5, 0.5)), second_1_m: 0.0 };
+    let length_m = JOIN_S * ego.speed_m_s.max(5.0);
+    LateralPath::join(road, lane, here, ego.s_m, length_m)
+}
+
 /// Mean grade under the combination, rad.
 fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
     let g = &limits.geometry;
@@ -339,12 +339,18 @@ fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
     libm::atan((front - rear) / length)
 }
 
-fn publish_path(out: &mut Vec<tractrix_core::PathPoint>, path: &LateralPath, road: &Road, ego: &EgoState) {
+fn publish_path(
+    out: &mut Vec<tractrix_core::PathPoint>,
+    path: &LateralPath,
+    road: &Road,
+    ego: &EgoState,
+) {
     let step_m = ego.speed_m_s.max(1.0) * PATH_STEP_S;
     out.clear();
-    out.extend((0..PATH_POINTS).map(|i| {
-        path.point(road, ego.s_m + i as f64 * step_m, i as f64 * PATH_STEP_S)
-    }));
+    out.extend(
+        (0..PATH_POINTS)
+            .map(|i| path.point(road, ego.s_m + i as f64 * step_m, i as f64 * PATH_STEP_S)),
+    );
 }
 
 /// Angle in -pi..pi.

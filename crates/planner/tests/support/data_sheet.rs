@@ -1,14 +1,15 @@
 //! The reference truck's data sheet for this crate's unit tests.
 
-use alloc::vec;
-use alloc::vec::Vec;
+#![allow(dead_code, unreachable_pub)]
+use std::vec;
+use std::vec::Vec;
 use tractrix_core::{
     BrakeLimits, Curve, FuelModel, Geometry, LateralLimits, PowertrainLimits, RPM_PER_RAD_S,
     RoadLoad, VehicleLimits,
 };
 
 /// Geometry of the reference truck.
-pub(crate) fn reference_geometry() -> Geometry {
+pub fn reference_geometry() -> Geometry {
     Geometry {
         front_m: 5.3,
         wheelbase_m: 3.9,
@@ -22,8 +23,14 @@ pub(crate) fn reference_geometry() -> Geometry {
     }
 }
 
+/// The data sheet's cornering stiffness of one axle, N/rad, from its static load.
+fn axle_stiffness(load_kg: f64, tyres: f64) -> f64 {
+    let load_n = load_kg * 9.80665;
+    7.4 * load_n * (1.0 - 0.18 * (load_n / tyres / 30e3 - 1.0))
+}
+
 /// Handling of the reference truck at 55 t.
-pub(crate) fn reference_lateral() -> LateralLimits {
+pub fn reference_lateral() -> LateralLimits {
     LateralLimits {
         steering_ratio: 24.0,
         steering_lag_s: 0.08,
@@ -34,16 +41,16 @@ pub(crate) fn reference_lateral() -> LateralLimits {
         trailer_cg_behind_hitch_m: 5.6,
         drive_half_spread_m: 0.7,
         trailer_half_spread_m: 1.2,
-        steer_stiffness_n_rad: 354e3,
-        drive_stiffness_n_rad: 1360e3,
-        trailer_stiffness_n_rad: 2406e3,
+        steer_stiffness_n_rad: axle_stiffness(4682.1, 2.0),
+        drive_stiffness_n_rad: 2.0 * axle_stiffness(8926.0, 4.0),
+        trailer_stiffness_n_rad: 3.0 * axle_stiffness(10_821.9, 4.0),
         rollover_accel_m_s2: 3.8,
         max_road_wheel_rad: 0.7,
     }
 }
 
 /// The whole data sheet at 55 t.
-pub(crate) fn reference_limits() -> VehicleLimits {
+pub fn reference_limits() -> VehicleLimits {
     let rpm: Vec<f64> = vec![
         600.0, 700.0, 800.0, 900.0, 1000.0, 1100.0, 1400.0, 1500.0, 1600.0, 1700.0, 1800.0, 1950.0,
         2100.0,
