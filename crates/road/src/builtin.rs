@@ -2,10 +2,10 @@
 
 use alloc::{vec, vec::Vec};
 
-use tractrix_core::Curve;
+use tractrix_core::GRAVITY_M_S2;
 
 use crate::road::parallel_lanes;
-use crate::{LaneEnd, LaneKind, LaneTrack, Line, Road};
+use crate::{Cubics, LaneEnd, LaneKind, LaneTrack, Line, Road, RoadObject};
 
 /// Grades of a hilly stretch of a real long-haul drive; origin and licence in the file's head.
 const HILLS: &str = include_str!("../data/longhaul_hills.csv");
@@ -20,40 +20,38 @@ const LENGTH_M: f64 = 15_000.0;
 /// climbing stretch's third lane on the left, 3 the on-ramp, 4 the off-ramp.
 #[must_use]
 pub fn highway() -> Road {
-    let grades = hills();
-    let curves = PlanView::new(&HIGHWAY_CURVES);
-    let line = Line::integrate(
-        LENGTH_M,
+    let curves = plan_view(&HIGHWAY_CURVES);
+    let line = Line::from_curvature(
         0.0,
-        |s| curves.at(s),
-        |s| grades.at(s),
-        |s| bank_rad(curves.at(s)),
+        &curves,
+        Cubics::integral_of_linear(0.0, &hills()),
+        bank(&curves),
     );
     let w = LANE_WIDTH_M;
-    let lane = |id, from, to, kind, end, center: Curve| LaneTrack {
+    let lane = |id, from, to, kind, end, center: Cubics| LaneTrack {
         id,
         s_start_m: from,
         s_end_m: to,
         kind,
         end,
         center,
-        width: Curve::constant(w),
-        speed_limit: None,
+        width: Cubics::constant(w),
+        speed_limits: Vec::new(),
+        sources: Vec::new(),
     };
     let through =
-        |id, d| lane(id, 0.0, LENGTH_M, LaneKind::Driving, LaneEnd::Continues, Curve::constant(d));
-    let ramp = |points: &[(f64, f64)]| curve(points);
+        |id, d| lane(id, 0.0, LENGTH_M, LaneKind::Driving, LaneEnd::Continues, Cubics::constant(d));
     let lanes = vec![
         through(0, -0.5 * w),
         through(1, 0.5 * w),
-        lane(2, 6_000.0, 8_500.0, LaneKind::Driving, LaneEnd::Drops, Curve::constant(1.5 * w)),
+        lane(2, 6_000.0, 8_500.0, LaneKind::Driving, LaneEnd::Drops, Cubics::constant(1.5 * w)),
         lane(
             3,
             2_700.0,
             3_350.0,
             LaneKind::Entry,
             LaneEnd::Drops,
-            ramp(&[(2_700.0, -3.6 * w), (3_000.0, -1.5 * w), (3_350.0, -1.5 * w)]),
+            Cubics::smooth_steps(&[(2_700.0, -3.6 * w), (3_000.0, -1.5 * w), (3_350.0, -1.5 * w)]),
         ),
         lane(
             4,
@@ -61,7 +59,11 @@ pub fn highway() -> Road {
             11_550.0,
             LaneKind::Exit,
             LaneEnd::Leaves,
-            ramp(&[(11_000.0, -1.5 * w), (11_250.0, -1.5 * w), (11_550.0, -3.6 * w)]),
+            Cubics::smooth_steps(&[
+                (11_000.0, -1.5 * w),
+                (11_250.0, -1.5 * w),
+                (11_550.0, -3.6 * w),
+            ]),
         ),
     ];
     let limits = vec![(0.0, 25.0), (9_000.0, 22.22), (10_000.0, 25.0)];
@@ -69,32 +71,44 @@ pub fn highway() -> Road {
 }
 
 /// 15 km with the statistics of the paper's site: grades to ±5 % with a standard deviation of
-/// 2.8 %, 225 m of climb, R = 600 m curves, two lanes. Heights are a sum of sines with fixed
-/// coefficients, limited to ±5 %.
+/// 2.8 %, 225 m of climb, R = 600 m curves, two lanes, one tunnel. The slope is a sum of sines with
+/// fixed coefficients, limited to ±5 %.
 #[must_use]
 pub fn test_site() -> Road {
-    let curves = PlanView::new(&SITE_CURVES);
-    let slope = |s: f64| {
-        let wave =
-            |period_m: f64, phase: f64| libm::sin(core::f64::consts::TAU * s / period_m + phase);
-        0.005
-            + 1.06
-                * (0.0325 * wave(2_500.0, 0.3)
-                    + 0.017 * wave(1_150.0, 1.9)
-                    + 0.008 * wave(610.0, 4.0))
+    let curves = plan_view(&SITE_CURVES);
+    let wave = |s: f64, period_m: f64, phase: f64| {
+        libm::sin(core::f64::consts::TAU * s / period_m + phase)
     };
-    let limited = |s: f64| slope(s).clamp(-0.05, 0.05);
+    let slope = |s: f64| {
+        let hills = 0.0325 * wave(s, 2_500.0, 0.3)
+            + 0.017 * wave(s, 1_150.0, 1.9)
+            + 0.008 * wave(s, 610.0, 4.0);
+        (0.005 + 1.06 * hills).clamp(-0.05, 0.05)
+    };
+    let slopes: Vec<(f64, f64)> =
+        (0..=750).map(|i| f64::from(i) * 20.0).map(|s| (s, slope(s))).collect();
     let line =
-        Line::integrate(LENGTH_M, 0.0, |s| curves.at(s), limited, |s| bank_rad(curves.at(s)));
+        Line::from_curvature(0.0, &curves, Cubics::integral_of_linear(0.0, &slopes), bank(&curves));
     let lanes = parallel_lanes(2, LANE_WIDTH_M, LENGTH_M);
-    expect_valid(Road::new("test-site", line, lanes, vec![(0.0, 25.0)]))
+    let tunnel = RoadObject {
+        kind: "tunnel".into(),
+        name: "test-site tunnel".into(),
+        s_start_m: 8_600.0,
+        s_end_m: 9_800.0,
+    };
+    expect_valid(Road::new("test-site", line, lanes, vec![(0.0, 25.0)])).with_objects(vec![tunnel])
 }
 
 /// Level, straight, two lanes, 25 m/s.
 #[must_use]
 pub fn flat(length_m: f64) -> Road {
     let length_m = if length_m.is_finite() { length_m.clamp(1.0, 1e7) } else { LENGTH_M };
-    let line = Line::integrate(length_m, 0.0, |_| 0.0, |_| 0.0, |_| 0.0);
+    let line = Line::from_curvature(
+        0.0,
+        &[(0.0, 0.0), (length_m, 0.0)],
+        Cubics::default(),
+        Cubics::default(),
+    );
     let lanes = parallel_lanes(2, LANE_WIDTH_M, length_m);
     expect_valid(Road::new("flat", line, lanes, vec![(0.0, 25.0)]))
 }
@@ -121,47 +135,36 @@ const SITE_CURVES: [(f64, f64, f64, f64); 6] = [
     (12_900.0, 150.0, 400.0, -1.0 / 700.0),
 ];
 
-/// Curvature of a chain of clothoid-arc-clothoid curves between straights.
-struct PlanView(Curve);
-
-impl PlanView {
-    fn new(curves: &[(f64, f64, f64, f64)]) -> Self {
-        let mut points = vec![(0.0, 0.0)];
-        for &(s, clothoid, arc, kappa) in curves {
-            points.extend([
-                (s, 0.0),
-                (s + clothoid, kappa),
-                (s + clothoid + arc, kappa),
-                (s + 2.0 * clothoid + arc, 0.0),
-            ]);
-        }
-        Self(curve(&points))
+/// Curvature of a chain of clothoid-arc-clothoid curves between straights: (station m, 1/m).
+fn plan_view(curves: &[(f64, f64, f64, f64)]) -> Vec<(f64, f64)> {
+    let mut points = vec![(0.0, 0.0)];
+    for &(s, clothoid, arc, kappa) in curves {
+        points.extend([
+            (s, 0.0),
+            (s + clothoid, kappa),
+            (s + clothoid + arc, kappa),
+            (s + 2.0 * clothoid + arc, 0.0),
+        ]);
     }
-
-    fn at(&self, s_m: f64) -> f64 {
-        self.0.at(s_m)
-    }
+    points.push((LENGTH_M, 0.0));
+    points
 }
 
-/// Bank that carries a third of the lateral acceleration at 80 km/h, at most 5 %; a left curve
-/// lifts the right side.
-fn bank_rad(curvature_1_m: f64) -> f64 {
-    -(22.2 * 22.2 * curvature_1_m / (3.0 * tractrix_core::GRAVITY_M_S2)).clamp(-0.05, 0.05)
+/// Bank that carries a third of the lateral acceleration at 80 km/h, at most 5 %, linear along the
+/// clothoids; a left curve lifts the right side.
+fn bank(curvature_1_m: &[(f64, f64)]) -> Cubics {
+    let bank_rad = |k: f64| -(22.2 * 22.2 * k / (3.0 * GRAVITY_M_S2)).clamp(-0.05, 0.05);
+    let points: Vec<_> = curvature_1_m.iter().map(|&(s, k)| (s, bank_rad(k))).collect();
+    Cubics::linear(&points)
 }
 
-fn hills() -> Curve {
-    let points: Vec<(f64, f64)> = HILLS
+/// (station m, slope) of the recorded hills.
+fn hills() -> Vec<(f64, f64)> {
+    HILLS
         .lines()
         .filter_map(|line| line.split_once(','))
         .filter_map(|(s, g)| Some((s.parse().ok()?, g.parse().ok()?)))
-        .collect();
-    curve(&points)
-}
-
-/// A curve from literal points; the tables above are checked by the tests of this file.
-fn curve(points: &[(f64, f64)]) -> Curve {
-    let (x, y) = points.iter().copied().unzip();
-    Curve::new("built-in", x, y).unwrap_or_else(|_| Curve::constant(0.0))
+        .collect()
 }
 
 #[expect(clippy::expect_used, reason = "built-in tables; the tests of this file build each")]

@@ -2,14 +2,21 @@
 
 use std::fs;
 
-use tractrix_core::Curve;
-
+use crate::line::Baker;
 use crate::road::parallel_lanes;
-use crate::{Line, Road, RoadError};
+use crate::smooth::{LocalFit, local_quadratic};
+use crate::{Cubics, Jet, Line, Road, RoadError};
 
 /// More rows than this are refused.
 const MAX_ROWS: usize = 2_000_000;
+/// Larger files are refused.
+const MAX_BYTES: u64 = 256 << 20;
 const LANE_WIDTH_M: f64 = 3.75;
+/// Half width of the window that smooths heights, m.
+const HEIGHT_WINDOW_M: f64 = 40.0;
+/// Half width of the window that smooths x and y, m.
+const PLAN_WINDOW_M: f64 = 60.0;
+/// Limit where the file has none: 90 km/h.
 const DEFAULT_LIMIT_M_S: f64 = 25.0;
 
 /// Column names and what they are also called in the field's files.
@@ -22,12 +29,16 @@ const COLUMNS: [(&str, &[&str]); 6] = [
     ("speed_limit_m_s", &[]),
 ];
 
-/// Reads a profile. Heights are made into a slope that is continuous (central differences of the
-/// samples, linear between them); the plan view comes from the curvature column, else from x and
-/// y, else it is straight.
+/// Reads a profile. Heights are smoothed so that the slope is continuous; the plan view comes from
+/// x and y, smoothed likewise, else from the curvature column (starting at the origin along x),
+/// else it is straight. Two lanes of 3.75 m, the reference line between them.
 pub(crate) fn read(path: &str) -> Result<Road, RoadError> {
-    let text = fs::read_to_string(path)
-        .map_err(|e| RoadError::Io { path: path.into(), why: e.to_string() })?;
+    let io = |why: String| RoadError::Io { path: path.into(), why };
+    let bytes = fs::metadata(path).map_err(|e| io(e.to_string()))?.len();
+    if bytes > MAX_BYTES {
+        return Err(io(format!("{bytes} bytes, at most {MAX_BYTES} are read")));
+    }
+    let text = fs::read_to_string(path).map_err(|e| io(e.to_string()))?;
     parse(path, &text)
 }
 
@@ -80,30 +91,23 @@ fn build(path: &str, table: &[Vec<f64>]) -> Result<Road, RoadError> {
     if let Some(w) = s.windows(2).find(|w| w[1] <= w[0]) {
         return Err(invalid(format!("s_m must increase, but {} follows {}", w[1], w[0])));
     }
-    let table_error = |e: tractrix_core::CoreError| invalid(e.to_string());
-    let slope = Curve::new("z_m", s.clone(), central_slope(&s, z)).map_err(table_error)?;
-    if let Some(i) = slope.y().iter().position(|g| g.abs() > 0.35) {
-        return Err(invalid(format!("slope {} at s_m = {} is not a road", slope.y()[i], s[i])));
+    let heights = local_quadratic(&s, z, HEIGHT_WINDOW_M);
+    if let Some((f, s)) = heights.iter().zip(&s).find(|(f, _)| !(f.slope.abs() <= 0.35)) {
+        return Err(invalid(format!("slope {} at s_m = {s} is not a road", f.slope)));
     }
-    let curvature = if !kappa.is_empty() {
-        kappa.clone()
-    } else if !x.is_empty() && !y.is_empty() {
-        curvature_of(&s, x, y)
-    } else {
-        vec![0.0; s.len()]
-    };
-    let curvature = Curve::new("curvature_1_m", s.clone(), curvature).map_err(table_error)?;
-    if let Some(i) = curvature.y().iter().position(|k| k.abs() > 0.05) {
-        return Err(invalid(format!(
-            "curvature {} 1/m at s_m = {} is tighter than R = 20 m",
-            curvature.y()[i],
-            s[i]
-        )));
-    }
-    let heading =
-        if x.len() > 1 && y.len() > 1 { libm::atan2(y[1] - y[0], x[1] - x[0]) } else { 0.0 };
+    let knots: Vec<_> = s.iter().zip(&heights).map(|(&s, f)| (s, f.value, f.slope)).collect();
+    let elevation = Cubics::hermite(&knots);
     let length_m = s[s.len() - 1];
-    let line = Line::integrate(length_m, heading, |p| curvature.at(p), |p| slope.at(p), |_| 0.0);
+    let line = if !x.is_empty() && !y.is_empty() {
+        plan_through(path, &s, x, y, elevation)?
+    } else {
+        let k = |i: usize| kappa.get(i).copied().unwrap_or(0.0);
+        let points: Vec<_> = s.iter().enumerate().map(|(i, &s)| (s, k(i))).collect();
+        if let Some((s, k)) = points.iter().find(|p| p.1.abs() > MAX_CURVATURE_1_M) {
+            return Err(invalid(tight(*k, *s)));
+        }
+        Line::from_curvature(0.0, &points, elevation, Cubics::default())
+    };
     let mut limits: Vec<(f64, f64)> = Vec::new();
     for (&s, &v) in s.iter().zip(limit) {
         if limits.last().is_none_or(|l| l.1 != v) {
@@ -116,40 +120,44 @@ fn build(path: &str, table: &[Vec<f64>]) -> Result<Road, RoadError> {
     Road::new(path, line, parallel_lanes(2, LANE_WIDTH_M, length_m), limits)
 }
 
-/// Central differences over the samples, one-sided at the ends.
-fn central_slope(s: &[f64], z: &[f64]) -> Vec<f64> {
-    let n = s.len();
-    (0..n)
-        .map(|i| {
-            let (a, b) = (i.saturating_sub(1), (i + 1).min(n - 1));
-            (z[b] - z[a]) / (s[b] - s[a])
-        })
-        .collect()
+/// Tighter curves than R = 20 m are taken for a mistake.
+const MAX_CURVATURE_1_M: f64 = 0.05;
+
+fn tight(curvature_1_m: f64, s_m: f64) -> String {
+    format!("curvature {curvature_1_m} 1/m at s_m = {s_m} is tighter than R = 20 m")
 }
 
-/// Curvature from headings of the chords, smoothed over at least 100 m, so that survey noise does
-/// not become steering.
-fn curvature_of(s: &[f64], x: &[f64], y: &[f64]) -> Vec<f64> {
-    let n = s.len();
-    let reach = |i: usize, ahead: bool| {
-        let mut j = i;
-        while (s[j] - s[i]).abs() < 50.0 && (if ahead { j + 1 < n } else { j > 0 }) {
-            j = if ahead { j + 1 } else { j - 1 };
-        }
-        j
+/// The plan view through smoothed points, with continuous heading and curvature.
+fn plan_through(
+    path: &str,
+    s: &[f64],
+    x: &[f64],
+    y: &[f64],
+    elevation: Cubics,
+) -> Result<Line, RoadError> {
+    let invalid = |why: String| RoadError::Invalid { name: path.into(), why };
+    let (fx, fy) = (local_quadratic(s, x, PLAN_WINDOW_M), local_quadratic(s, y, PLAN_WINDOW_M));
+    let jet = |(u, v): (&LocalFit, &LocalFit)| Jet {
+        point: [u.value, v.value],
+        first: [u.slope, v.slope],
+        second: [u.bend, v.bend],
     };
-    (0..n)
-        .map(|i| {
-            let (a, b) = (reach(i, false), reach(i, true));
-            if a == i || b == i {
-                return 0.0;
-            }
-            let before = libm::atan2(y[i] - y[a], x[i] - x[a]);
-            let after = libm::atan2(y[b] - y[i], x[b] - x[i]);
-            let turn = libm::remainder(after - before, core::f64::consts::TAU);
-            turn / (0.5 * (s[b] - s[a]))
-        })
-        .collect()
+    let jets: Vec<Jet> = fx.iter().zip(&fy).map(jet).collect();
+    let mut baker = Baker::default();
+    for (i, jet) in jets.iter().enumerate() {
+        let speed = libm::hypot(jet.first[0], jet.first[1]);
+        if !(speed > 0.9 && speed < 1.1) {
+            let why = format!("x_m and y_m move {speed} m per metre of s_m at s_m = {}", s[i]);
+            return Err(invalid(why));
+        }
+        if !(jet.curvature_1_m().abs() <= MAX_CURVATURE_1_M) {
+            return Err(invalid(tight(jet.curvature_1_m(), s[i])));
+        }
+        if let Some(next) = jets.get(i + 1) {
+            baker.push_between(s[i + 1] - s[i], jet, next);
+        }
+    }
+    Ok(baker.finish(elevation, Cubics::default()))
 }
 
 #[cfg(test)]

@@ -24,6 +24,18 @@ pub enum RoadError {
         /// What is wrong, with column and value.
         why: String,
     },
+    /// An OpenDRIVE element cannot be used.
+    #[error("{path}: line {line}: <{element}>: {why}")]
+    OpenDrive {
+        /// The file.
+        path: String,
+        /// Line of the element, from 1.
+        line: u32,
+        /// Name of the element.
+        element: String,
+        /// What is wrong, with attribute and value.
+        why: String,
+    },
     /// The geometry does not make a road.
     #[error("road {name}: {why}")]
     Invalid {

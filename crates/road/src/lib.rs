@@ -9,12 +9,18 @@ extern crate alloc;
 pub mod builtin;
 #[cfg(feature = "std")]
 mod csv_profile;
+mod cubics;
 mod error;
 mod lane;
 mod line;
 mod road;
+mod shape;
+#[cfg(feature = "std")]
+mod smooth;
 
+pub use cubics::Cubics;
 pub use error::RoadError;
-pub use lane::{LaneEnd, LaneKind, LaneTrack};
-pub use line::{Knot, Line};
-pub use road::{ProfilePoint, Road, RoadPoint, RoadPosition};
+pub use lane::{LaneEnd, LaneKind, LaneSource, LaneTrack};
+pub use line::{BAKE_TOLERANCE_M, Knot, Line};
+pub use road::{ProfilePoint, Road, RoadObject, RoadPoint, RoadPosition};
+pub use shape::{Jet, Placed, Shape};

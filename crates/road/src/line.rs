@@ -1,12 +1,23 @@
-//! The reference line as a table of knots: pose, curvature, height, bank.
+//! The reference line, ready for fast look-up: plan view, height and bank over station.
 //!
-//! Between two knots the plan view is a cubic Hermite in x and y over station (error of order
-//! `h^4 kappa'`, below a micrometre for clothoids at the knot spacing used here), heights are
-//! cubic, curvature and bank linear.
+//! A plan curve is baked into cells. A cell holds x and y as quintics in its own axes (origin at
+//! its start, first axis along its start heading), fitted to position, first and second derivative
+//! of the exact curve at both ends, and split until it meets the exact curve within
+//! [`BAKE_TOLERANCE_M`]. So heading and curvature belong to the same curve as the position, and a
+//! look-up costs one division and a few multiplications. Heights and bank are the exact cubics.
 
 use alloc::vec::Vec;
 
-/// One knot of the reference line.
+use crate::{Cubics, Jet, Placed, Shape};
+
+/// Largest distance between the baked and the exact curve, m (plus rounding of large coordinates).
+pub const BAKE_TOLERANCE_M: f64 = 1e-9;
+const LONGEST_CELL_M: f64 = 25.0;
+const SHORTEST_CELL_M: f64 = 0.02;
+/// A point farther than this from the line, or beyond its ends, has no road coordinates.
+const REACH_M: f64 = 200.0;
+
+/// The reference line at one station.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Knot {
     /// Station, m.
@@ -15,7 +26,7 @@ pub struct Knot {
     pub x_m: f64,
     /// Map y, m.
     pub y_m: f64,
-    /// Heading, rad, continuous (not wrapped).
+    /// Heading, rad, continuous along the line (not wrapped).
     pub heading_rad: f64,
     /// Curvature, 1/m, positive left.
     pub curvature_1_m: f64,
@@ -27,137 +38,331 @@ pub struct Knot {
     pub bank_rad: f64,
 }
 
-/// A reference line. Knots are spaced evenly, so that a look-up is a division.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Cell {
+    s_m: f64,
+    length_m: f64,
+    x_m: f64,
+    y_m: f64,
+    heading_rad: f64,
+    cos: f64,
+    sin: f64,
+    /// Coefficients of t..t⁵ along the start heading.
+    u: [f64; 5],
+    /// Coefficients of t..t⁵ to its left.
+    v: [f64; 5],
+}
+
+/// A reference line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
-    step_m: f64,
-    knots: Vec<Knot>,
+    cells: Vec<Cell>,
+    /// First cell of each of `buckets.len()` equal parts of the line.
+    buckets: Vec<u32>,
+    length_m: f64,
+    elevation: Cubics,
+    bank: Cubics,
 }
 
 impl Line {
-    /// Integrates curvature, slope and bank given as functions of station into a line that starts
-    /// at the map's origin in the direction `heading_rad`.
-    pub fn integrate(
-        length_m: f64,
-        heading_rad: f64,
-        curvature_1_m: impl Fn(f64) -> f64,
-        slope: impl Fn(f64) -> f64,
-        bank_rad: impl Fn(f64) -> f64,
-    ) -> Self {
-        let intervals = (libm::ceil(length_m / 2.0) as usize).max(1);
-        let step_m = length_m / intervals as f64;
-        let mut knots = Vec::with_capacity(intervals + 1);
-        let mut knot = Knot {
-            heading_rad,
-            curvature_1_m: curvature_1_m(0.0),
-            slope: slope(0.0),
-            bank_rad: bank_rad(0.0),
-            ..Knot::default()
-        };
-        knots.push(knot);
-        for i in 0..intervals {
-            let s0 = i as f64 * step_m;
-            let mid = s0 + 0.5 * step_m;
-            let s1 = (i + 1) as f64 * step_m;
-            let (k0, km, k1) = (knot.curvature_1_m, curvature_1_m(mid), curvature_1_m(s1));
-            let heading_mid = knot.heading_rad + step_m * (5.0 * k0 + 8.0 * km - k1) / 24.0;
-            let heading_end = knot.heading_rad + step_m * (k0 + 4.0 * km + k1) / 6.0;
-            let (sin0, cos0) = libm::sincos(knot.heading_rad);
-            let (sinm, cosm) = libm::sincos(heading_mid);
-            let (sin1, cos1) = libm::sincos(heading_end);
-            let (g0, gm, g1) = (knot.slope, slope(mid), slope(s1));
-            knot = Knot {
-                s_m: s1,
-                x_m: knot.x_m + step_m * (cos0 + 4.0 * cosm + cos1) / 6.0,
-                y_m: knot.y_m + step_m * (sin0 + 4.0 * sinm + sin1) / 6.0,
-                heading_rad: heading_end,
-                curvature_1_m: k1,
-                z_m: knot.z_m + step_m * (g0 + 4.0 * gm + g1) / 6.0,
-                slope: g1,
-                bank_rad: bank_rad(s1),
-            };
-            knots.push(knot);
+    /// A line from placed elements, one after the other (their `s_m` is not used), with height and
+    /// bank over station. An empty list gives a line of one millimetre at the origin.
+    #[must_use]
+    pub fn from_elements(elements: &[Placed], elevation: Cubics, bank: Cubics) -> Self {
+        let mut baker = Baker::default();
+        for e in elements {
+            baker.push(e.length_m, &|ds| e.at(ds));
         }
-        Self { step_m, knots }
+        baker.finish(elevation, bank)
+    }
+
+    /// A line that starts at the map's origin in direction `heading_rad` and has a curvature that
+    /// is linear between (station m, curvature 1/m) points: a chain of clothoids.
+    #[must_use]
+    pub fn from_curvature(
+        heading_rad: f64,
+        points: &[(f64, f64)],
+        elevation: Cubics,
+        bank: Cubics,
+    ) -> Self {
+        let (mut x_m, mut y_m, mut heading) = (0.0, 0.0, heading_rad);
+        let mut baker = Baker::default();
+        for w in points.windows(2) {
+            let ((s_m, start_1_m), (s1, end_1_m)) = (w[0], w[1]);
+            let length_m = s1 - s_m;
+            let shape = Shape::Spiral { start_1_m, end_1_m };
+            let placed = Placed { s_m, x_m, y_m, heading_rad: heading, length_m, shape };
+            baker.push(length_m, &|ds| placed.at(ds));
+            [x_m, y_m] = placed.at(length_m).point;
+            heading += 0.5 * (start_1_m + end_1_m) * length_m;
+        }
+        baker.finish(elevation, bank)
     }
 
     /// Length, m.
     #[must_use]
-    pub fn length_m(&self) -> f64 {
-        self.knots[self.knots.len() - 1].s_m
+    pub const fn length_m(&self) -> f64 {
+        self.length_m
     }
 
-    /// The knots.
+    /// Height over station.
     #[must_use]
-    pub fn knots(&self) -> &[Knot] {
-        &self.knots
+    pub const fn elevation(&self) -> &Cubics {
+        &self.elevation
     }
 
-    /// The line at a station, clamped to its ends.
+    /// Bank over station.
+    #[must_use]
+    pub const fn bank(&self) -> &Cubics {
+        &self.bank
+    }
+
+    /// Stations at which cells begin, and the end: the curve is smooth between them.
+    pub fn joints_m(&self) -> impl Iterator<Item = f64> + '_ {
+        self.cells.iter().map(|c| c.s_m).chain(core::iter::once(self.length_m))
+    }
+
+    fn cell(&self, s_m: f64) -> usize {
+        let n = self.buckets.len();
+        let u = s_m / self.length_m * n as f64;
+        let bucket = if u > 0.0 { (u as usize).min(n - 1) } else { 0 };
+        let mut i = self.buckets[bucket] as usize;
+        while i + 1 < self.cells.len() && self.cells[i + 1].s_m <= s_m {
+            i += 1;
+        }
+        i
+    }
+
+    /// The line at a station, clamped to its ends; at a joint, the side that begins there.
     #[must_use]
     pub fn at(&self, s_m: f64) -> Knot {
-        let n = self.knots.len();
-        let u = s_m / self.step_m;
-        let i = if u > 0.0 { (u as usize).min(n - 2) } else { 0 };
-        let (a, b) = (&self.knots[i], &self.knots[i + 1]);
-        let h = self.step_m;
-        let t = ((s_m - a.s_m) / h).clamp(0.0, 1.0);
-        let (sa, ca) = libm::sincos(a.heading_rad);
-        let (sb, cb) = libm::sincos(b.heading_rad);
-        let curve = |p0: f64, m0: f64, p1: f64, m1: f64| {
-            let (t2, t3) = (t * t, t * t * t);
-            (2.0 * t3 - 3.0 * t2 + 1.0) * p0
-                + (t3 - 2.0 * t2 + t) * h * m0
-                + (3.0 * t2 - 2.0 * t3) * p1
-                + (t3 - t2) * h * m1
-        };
-        let curvature = a.curvature_1_m + t * (b.curvature_1_m - a.curvature_1_m);
+        let s = s_m.clamp(0.0, self.length_m);
+        self.knot(&self.cells[self.cell(s)], s)
+    }
+
+    /// The line at the end of the piece that holds `inside_m`, as that piece sees it.
+    pub(crate) fn at_in(&self, s_m: f64, inside_m: f64) -> Knot {
+        self.knot(&self.cells[self.cell(inside_m.clamp(0.0, self.length_m))], s_m)
+    }
+
+    fn knot(&self, cell: &Cell, s_m: f64) -> Knot {
+        let local = cell.local(s_m - cell.s_m);
+        let ([u, v], [du, dv], [ddu, ddv]) = (local.point, local.first, local.second);
+        let q = du * du + dv * dv;
+        let (z_m, slope) = self.elevation.at_with_slope(s_m);
         Knot {
-            s_m: a.s_m + t * h,
-            x_m: curve(a.x_m, ca, b.x_m, cb),
-            y_m: curve(a.y_m, sa, b.y_m, sb),
-            heading_rad: curve(a.heading_rad, a.curvature_1_m, b.heading_rad, b.curvature_1_m),
-            curvature_1_m: curvature,
-            z_m: curve(a.z_m, a.slope, b.z_m, b.slope),
-            slope: a.slope + t * (b.slope - a.slope),
-            bank_rad: a.bank_rad + t * (b.bank_rad - a.bank_rad),
+            s_m,
+            x_m: cell.x_m + cell.cos * u - cell.sin * v,
+            y_m: cell.y_m + cell.sin * u + cell.cos * v,
+            heading_rad: cell.heading_rad + libm::atan2(dv, du),
+            curvature_1_m: (du * ddv - dv * ddu) / (q * libm::sqrt(q)),
+            z_m,
+            slope,
+            bank_rad: self.bank.at(s_m),
         }
     }
 
-    /// Station and offset of the point of the line nearest to (x, y); near `hint_s_m` if given,
-    /// else over the whole line.
+    /// Station of the nearest point of the line and the distance to its left in plan view. Near
+    /// `hint_s_m` if given, else over the whole line. `None` for a point that is not finite, or
+    /// farther than 200 m from the line or beyond its ends. Just beyond an end the station is that
+    /// end's.
     #[must_use]
     pub fn project(&self, x_m: f64, y_m: f64, hint_s_m: Option<f64>) -> Option<(f64, f64)> {
         if !(x_m.is_finite() && y_m.is_finite()) {
             return None;
         }
-        let mut s = match hint_s_m {
-            Some(s) => s,
-            None => {
-                let nearest = self.knots.iter().min_by(|a, b| {
-                    let d =
-                        |k: &Knot| (k.x_m - x_m) * (k.x_m - x_m) + (k.y_m - y_m) * (k.y_m - y_m);
-                    d(a).total_cmp(&d(b))
-                })?;
-                nearest.s_m
-            }
-        };
-        for _ in 0..12 {
-            let k = self.at(s);
-            let (sin, cos) = libm::sincos(k.heading_rad);
-            let (dx, dy) = (x_m - k.x_m, y_m - k.y_m);
-            let along = dx * cos + dy * sin;
-            let across = dy * cos - dx * sin;
-            let next =
-                (s + along / (1.0 - k.curvature_1_m * across).max(0.1)).clamp(0.0, self.length_m());
-            let moved = (next - s).abs();
-            s = next;
-            if moved < 1e-9 {
-                break;
+        if let Some(hint) = hint_s_m.filter(|h| h.is_finite()) {
+            let hint = hint.clamp(0.0, self.length_m);
+            let found = self.descend(x_m, y_m, hint).filter(|f| (f.0 - hint).abs() <= REACH_M);
+            if found.is_some() {
+                return found;
             }
         }
+        let nearest = self.cells.iter().fold(f64::MAX, |r, c| r.min(c.distance_to_start(x_m, y_m)));
+        let mut best: Option<(f64, (f64, f64))> = None;
+        for cell in &self.cells {
+            // No point of a cell is farther from its start than its length (plus rounding).
+            if cell.distance_to_start(x_m, y_m) - 1.01 * cell.length_m > nearest {
+                continue;
+            }
+            let mid = cell.s_m + 0.5 * cell.length_m;
+            if let Some(f) = self.descend(x_m, y_m, mid) {
+                let k = self.at(f.0);
+                let r = libm::hypot(x_m - k.x_m, y_m - k.y_m);
+                if best.is_none_or(|b| r < b.0) {
+                    best = Some((r, f));
+                }
+            }
+        }
+        best.map(|b| b.1)
+    }
+
+    /// Newton's method on the foot point: `(q - p(s)) · p'(s) = 0`.
+    fn descend(&self, x_m: f64, y_m: f64, start_m: f64) -> Option<(f64, f64)> {
+        let mut s = start_m;
+        let mut i = self.cell(s);
+        for _ in 0..30 {
+            while s < self.cells[i].s_m && i > 0 {
+                i -= 1;
+            }
+            while i + 1 < self.cells.len() && s >= self.cells[i + 1].s_m {
+                i += 1;
+            }
+            let cell = &self.cells[i];
+            let local = cell.local(s - cell.s_m);
+            let (dx, dy) = (x_m - cell.x_m, y_m - cell.y_m);
+            let ru = cell.cos * dx + cell.sin * dy - local.point[0];
+            let rv = cell.cos * dy - cell.sin * dx - local.point[1];
+            let ([du, dv], [ddu, ddv]) = (local.first, local.second);
+            let along = ru * du + rv * dv;
+            let bend = du * du + dv * dv - ru * ddu - rv * ddv;
+            let step = (along / bend.max(0.1)).clamp(-50.0, 50.0);
+            let next = (s + step).clamp(0.0, self.length_m);
+            let moved = (next - s).abs();
+            s = next;
+            if moved < 1e-10 {
+                let across = (rv * du - ru * dv) / libm::sqrt(du * du + dv * dv);
+                let near = across.abs() <= REACH_M && along.abs() <= REACH_M;
+                return near.then_some((s, across));
+            }
+            if moved < 1e-7 && s > cell.s_m && s < cell.s_m + cell.length_m {
+                // One more step is below rounding; the offset at the foot point has no slope.
+                let across = (rv * du - ru * dv) / libm::sqrt(du * du + dv * dv);
+                return (across.abs() <= REACH_M).then_some((s, across));
+            }
+        }
+        // A corner between cells: the foot point is the corner itself.
         let k = self.at(s);
         let (sin, cos) = libm::sincos(k.heading_rad);
-        Some((s, (y_m - k.y_m) * cos - (x_m - k.x_m) * sin))
+        let across = (y_m - k.y_m) * cos - (x_m - k.x_m) * sin;
+        (across.abs() <= REACH_M).then_some((s, across))
+    }
+}
+
+impl Cell {
+    /// Point and derivatives in the cell's axes, `t` metres from its start.
+    fn local(&self, t: f64) -> Jet {
+        let p = |c: &[f64; 5]| t * (c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * c[4]))));
+        let p1 = |c: &[f64; 5]| {
+            c[0] + t * (2.0 * c[1] + t * (3.0 * c[2] + t * (4.0 * c[3] + t * 5.0 * c[4])))
+        };
+        let p2 = |c: &[f64; 5]| 2.0 * c[1] + t * (6.0 * c[2] + t * (12.0 * c[3] + t * 20.0 * c[4]));
+        Jet {
+            point: [p(&self.u), p(&self.v)],
+            first: [p1(&self.u), p1(&self.v)],
+            second: [p2(&self.u), p2(&self.v)],
+        }
+    }
+
+    fn distance_to_start(&self, x_m: f64, y_m: f64) -> f64 {
+        libm::hypot(x_m - self.x_m, y_m - self.y_m)
+    }
+
+    /// The quintic that meets `a` at 0 and `b` at `length_m` with two derivatives.
+    fn fit(s_m: f64, length_m: f64, a: &Jet, b: &Jet, heading_before: Option<f64>) -> Self {
+        let wrapped = a.heading_rad();
+        let heading_rad = heading_before
+            .map_or(wrapped, |h| h + libm::remainder(wrapped - h, 2.0 * core::f64::consts::PI));
+        let (sin, cos) = libm::sincos(wrapped);
+        let turn = |[x, y]: [f64; 2]| [cos * x + sin * y, cos * y - sin * x];
+        let end = turn([b.point[0] - a.point[0], b.point[1] - a.point[1]]);
+        let (a1, a2, b1, b2) = (turn(a.first), turn(a.second), turn(b.first), turn(b.second));
+        let h = length_m;
+        let axis = |k: usize| {
+            let (m0, c0) = (a1[k], 0.5 * a2[k]);
+            let p = (end[k] - h * (m0 + h * c0)) / (h * h * h);
+            let q = (b1[k] - m0 - 2.0 * c0 * h) / (h * h);
+            let r = (b2[k] - 2.0 * c0) / h;
+            [
+                m0,
+                c0,
+                10.0 * p - 4.0 * q + 0.5 * r,
+                (-15.0 * p + 7.0 * q - r) / h,
+                (6.0 * p - 3.0 * q + 0.5 * r) / (h * h),
+            ]
+        };
+        let [x_m, y_m] = a.point;
+        Self { s_m, length_m, x_m, y_m, heading_rad, cos, sin, u: axis(0), v: axis(1) }
+    }
+}
+
+/// Collects cells.
+#[derive(Default)]
+pub(crate) struct Baker {
+    cells: Vec<Cell>,
+    s_m: f64,
+}
+
+impl Baker {
+    /// Appends a smooth curve of `length_m`, given with its derivatives by station.
+    pub(crate) fn push(&mut self, length_m: f64, curve: &dyn Fn(f64) -> Jet) {
+        if !(length_m > 1e-6) {
+            return;
+        }
+        let parts = libm::ceil(length_m / LONGEST_CELL_M).max(1.0) as usize;
+        let h = length_m / parts as f64;
+        for i in 0..parts {
+            self.refine(i as f64 * h, (i + 1) as f64 * h, curve);
+        }
+        self.s_m += length_m;
+    }
+
+    /// Appends the quintic between two points, `length_m` of station apart.
+    #[cfg(feature = "std")]
+    pub(crate) fn push_between(&mut self, length_m: f64, a: &Jet, b: &Jet) {
+        let cell = Cell::fit(self.s_m, length_m, a, b, self.end_heading_rad());
+        self.cells.push(cell);
+        self.s_m += length_m;
+    }
+
+    fn end_heading_rad(&self) -> Option<f64> {
+        self.cells.last().map(|c| {
+            let e = c.local(c.length_m);
+            c.heading_rad + libm::atan2(e.first[1], e.first[0])
+        })
+    }
+
+    fn refine(&mut self, from_m: f64, to_m: f64, curve: &dyn Fn(f64) -> Jet) {
+        let h = to_m - from_m;
+        let before = self.end_heading_rad();
+        let cell = Cell::fit(self.s_m + from_m, h, &curve(from_m), &curve(to_m), before);
+        let far = [0.25, 0.5, 0.75].into_iter().any(|f| {
+            let exact = curve(from_m + f * h).point;
+            let [u, v] = cell.local(f * h).point;
+            let x = cell.x_m + cell.cos * u - cell.sin * v;
+            let y = cell.y_m + cell.sin * u + cell.cos * v;
+            let scale = libm::fabs(x).max(libm::fabs(y));
+            libm::hypot(x - exact[0], y - exact[1]) > BAKE_TOLERANCE_M + 1e-15 * scale
+        });
+        if far && h > SHORTEST_CELL_M {
+            let mid = 0.5 * (from_m + to_m);
+            self.refine(from_m, mid, curve);
+            self.refine(mid, to_m, curve);
+        } else {
+            self.cells.push(cell);
+        }
+    }
+
+    /// Station reached, m.
+    pub(crate) const fn length_m(&self) -> f64 {
+        self.s_m
+    }
+
+    /// The line.
+    pub(crate) fn finish(mut self, elevation: Cubics, bank: Cubics) -> Line {
+        if self.cells.is_empty() {
+            self.push(1e-3, &|ds| Jet { point: [ds, 0.0], first: [1.0, 0.0], second: [0.0, 0.0] });
+        }
+        let (length_m, n) = (self.s_m, self.cells.len());
+        let mut buckets = Vec::with_capacity(n);
+        let mut cell = 0;
+        for i in 0..n {
+            let s = length_m * i as f64 / n as f64;
+            while cell + 1 < n && self.cells[cell + 1].s_m <= s {
+                cell += 1;
+            }
+            buckets.push(cell as u32);
+        }
+        Line { cells: self.cells, buckets, length_m, elevation, bank }
     }
 }

@@ -2,9 +2,7 @@
 
 use alloc::{string::String, vec::Vec};
 
-use tractrix_core::Curve;
-
-use crate::{LaneKind, LaneTrack, Line, RoadError};
+use crate::{Cubics, LaneKind, LaneTrack, Line, RoadError};
 
 /// A point on the road surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -51,21 +49,45 @@ pub struct ProfilePoint {
     pub speed_limit_m_s: f64,
 }
 
-/// One carriageway as the ego drives it.
+/// Something recorded along the road that is not a lane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoadObject {
+    /// What it is: `tunnel`, `bridge`.
+    pub kind: String,
+    /// Its name in the map.
+    pub name: String,
+    /// First station, m.
+    pub s_start_m: f64,
+    /// Last station, m.
+    pub s_end_m: f64,
+}
+
+/// Lanes between two stations at which a lane begins or ends.
+#[derive(Debug, Clone, PartialEq)]
+struct Section {
+    s_m: f64,
+    /// Lane ids from right to left.
+    lanes: Vec<u16>,
+}
+
+/// One carriageway as the ego drives it. Immutable; share it in an `Arc`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Road {
     name: String,
     line: Line,
     lanes: Vec<LaneTrack>,
+    sections: Vec<Section>,
     limits: Vec<(f64, f64)>,
+    objects: Vec<RoadObject>,
 }
 
 impl Road {
-    /// A road from its parts. `limits` are (from station m, limit m/s) in order, the first at 0.
+    /// A road from its parts. `limits` are (from station m, limit m/s) in order, the first at 0;
+    /// an infinite limit means that there is none.
     ///
     /// # Errors
-    /// [`RoadError::Invalid`] if there is no lane, a lane's index is not its position, or the
-    /// limits are out of order.
+    /// [`RoadError::Invalid`] if there is no lane, a lane's index is not its position, a lane's
+    /// stations are not finite and in order, or the limits are out of order.
     pub fn new(
         name: &str,
         line: Line,
@@ -83,7 +105,41 @@ impl Road {
         if limits.is_empty() || !ordered || limits.iter().any(|l| !(l.1 > 0.0)) {
             return Err(bad("speed limits must be positive and in order of station"));
         }
-        Ok(Self { name: name.into(), line, lanes, limits })
+        if lanes.iter().any(|l| !(l.s_end_m >= l.s_start_m && l.s_end_m.is_finite())) {
+            return Err(bad("a lane must end after its start"));
+        }
+        let sections = sections(&lanes, line.length_m());
+        Ok(Self { name: name.into(), line, lanes, sections, limits, objects: Vec::new() })
+    }
+
+    /// The same road with objects recorded along it.
+    #[must_use]
+    pub fn with_objects(mut self, objects: Vec<RoadObject>) -> Self {
+        self.objects = objects;
+        self
+    }
+
+    /// Tunnels and bridges along the road.
+    #[must_use]
+    pub fn objects(&self) -> &[RoadObject] {
+        &self.objects
+    }
+
+    /// Whether a station lies in a tunnel.
+    #[must_use]
+    pub fn in_tunnel(&self, s_m: f64) -> bool {
+        self.objects.iter().any(|o| o.kind == "tunnel" && o.s_start_m <= s_m && s_m <= o.s_end_m)
+    }
+
+    /// (from station m, limit m/s) of the road.
+    #[must_use]
+    pub fn speed_limits(&self) -> &[(f64, f64)] {
+        &self.limits
+    }
+
+    /// Stations at which a lane begins or ends, from 0 to the road's end.
+    pub fn section_starts_m(&self) -> impl Iterator<Item = f64> + '_ {
+        self.sections.iter().map(|s| s.s_m)
     }
 
     /// Name of the road.
@@ -134,12 +190,18 @@ impl Road {
         &self.lanes
     }
 
-    /// Lanes that exist at a station, in order of their ids.
-    pub fn lanes_at(&self, s_m: f64) -> impl Iterator<Item = &LaneTrack> {
-        self.lanes.iter().filter(move |l| l.exists_at(s_m))
+    fn section(&self, s_m: f64) -> &Section {
+        let i = self.sections.partition_point(|s| s.s_m <= s_m);
+        &self.sections[i.max(1) - 1]
     }
 
-    /// The lane that holds the point (s, d), shoulders included; the nearest centre wins.
+    /// Lanes that exist at a station, from right to left.
+    pub fn lanes_at(&self, s_m: f64) -> impl Iterator<Item = &LaneTrack> {
+        self.section(s_m).lanes.iter().map(|&id| &self.lanes[usize::from(id)])
+    }
+
+    /// The lane that holds the point (s, d), shoulders included; the nearest centre wins where
+    /// lanes overlap.
     #[must_use]
     pub fn lane_at(&self, s_m: f64, d_m: f64) -> Option<u16> {
         self.lanes_at(s_m)
@@ -172,7 +234,7 @@ impl Road {
             .map(|(id, ..)| id)
     }
 
-    /// Speed limit of the road, m/s.
+    /// Speed limit of the road for the ego, m/s; infinite where the map has none.
     #[must_use]
     pub fn speed_limit_m_s(&self, s_m: f64) -> f64 {
         let i = self.limits.partition_point(|l| l.0 <= s_m);
@@ -184,8 +246,8 @@ impl Road {
     pub fn lane_speed_limit_m_s(&self, lane: u16, s_m: f64) -> f64 {
         self.lanes
             .get(usize::from(lane))
-            .and_then(|l| l.speed_limit.as_ref())
-            .map_or_else(|| self.speed_limit_m_s(s_m), |c| c.at(s_m))
+            .and_then(|l| l.own_speed_limit_m_s(s_m))
+            .unwrap_or_else(|| self.speed_limit_m_s(s_m))
     }
 
     /// Fills `out` with the profile from `s0_m` on, `step_m` apart; clamped at the end.
@@ -213,10 +275,34 @@ impl Road {
             "builtin:highway" => Ok(crate::builtin::highway()),
             "builtin:test-site" => Ok(crate::builtin::test_site()),
             "builtin:flat" => Ok(crate::builtin::flat(15_000.0)),
-            _ if name.ends_with(".csv") => crate::csv_profile::read(name),
+            _ if has_extension(name, "csv") => crate::csv_profile::read(name),
             _ => Err(RoadError::UnknownRoad { name: name.into() }),
         }
     }
+}
+
+#[cfg(feature = "std")]
+fn has_extension(name: &str, want: &str) -> bool {
+    std::path::Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case(want))
+}
+
+/// Splits the road where a lane begins or ends and orders the lanes of each part by their offset
+/// in its middle.
+fn sections(lanes: &[LaneTrack], length_m: f64) -> Vec<Section> {
+    let mut starts: Vec<f64> = lanes.iter().flat_map(|l| [l.s_start_m, l.s_end_m]).collect();
+    starts.push(0.0);
+    starts.retain(|&s| s >= 0.0 && s < length_m - 1e-6);
+    starts.sort_by(f64::total_cmp);
+    starts.dedup_by(|b, a| *b - *a < 1e-6);
+    let mut out = Vec::with_capacity(starts.len());
+    for (i, &s_m) in starts.iter().enumerate() {
+        let mid = 0.5 * (s_m + starts.get(i + 1).copied().unwrap_or(length_m));
+        let mut here: Vec<u16> = lanes.iter().filter(|l| l.exists_at(mid)).map(|l| l.id).collect();
+        let d = |id: u16| lanes[usize::from(id)].center_d_m(mid);
+        here.sort_by(|&a, &b| d(a).total_cmp(&d(b)));
+        out.push(Section { s_m, lanes: here });
+    }
+    out
 }
 
 /// Lane tracks of equal width along a whole road, rightmost first, the reference line between the
@@ -229,9 +315,10 @@ pub(crate) fn parallel_lanes(count: u16, width_m: f64, length_m: f64) -> Vec<Lan
             s_end_m: length_m,
             kind: LaneKind::Driving,
             end: crate::LaneEnd::Continues,
-            center: Curve::constant((f64::from(id) - 0.5 * (f64::from(count) - 1.0)) * width_m),
-            width: Curve::constant(width_m),
-            speed_limit: None,
+            center: Cubics::constant((f64::from(id) - 0.5 * (f64::from(count) - 1.0)) * width_m),
+            width: Cubics::constant(width_m),
+            speed_limits: Vec::new(),
+            sources: Vec::new(),
         })
         .collect()
 }

@@ -1,0 +1,238 @@
+//! Plan-view elements of OpenDRIVE, evaluated exactly in f64: line, arc, spiral, poly3, paramPoly3.
+//!
+//! Symbols: `ds` distance along the element, m; `k` curvature, 1/m, positive left; `(u, v)` local
+//! axes of the element (u along its start heading, v left), m. Source: ASAM OpenDRIVE 1.8,
+//! section 9 (geometry).
+//!
+//! A spiral is a clothoid: `θ(ds) = k0 ds + (k1 - k0) ds²/(2 L)`, its position the Fresnel integral
+//! of `(cos θ, sin θ)`, taken by Gauss-Legendre quadrature on panels that turn less than 0.4 rad
+//! (error below 1e-15 of the length). poly3 and normalized paramPoly3 are not parametrised by arc
+//! length; `ds` is turned into their parameter by inverting the arc-length integral.
+
+/// One element of the plan view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Shape {
+    /// Straight line.
+    Line,
+    /// Circular arc.
+    Arc {
+        /// Curvature, 1/m.
+        curvature_1_m: f64,
+    },
+    /// Clothoid, curvature linear in station.
+    Spiral {
+        /// Curvature at the start, 1/m.
+        start_1_m: f64,
+        /// Curvature at the end, 1/m.
+        end_1_m: f64,
+    },
+    /// `v = a + b u + c u² + d u³`.
+    Poly3 {
+        /// `[a, b, c, d]`.
+        v: [f64; 4],
+    },
+    /// `u(p), v(p)`, both cubic.
+    ParamPoly3 {
+        /// `[aU, bU, cU, dU]`.
+        u: [f64; 4],
+        /// `[aV, bV, cV, dV]`.
+        v: [f64; 4],
+        /// `p` runs from 0 to 1 (else from 0 to the length).
+        normalized: bool,
+    },
+}
+
+/// An element with its place on the map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placed {
+    /// Station of its start on its road, m.
+    pub s_m: f64,
+    /// Map x of its start, m.
+    pub x_m: f64,
+    /// Map y of its start, m.
+    pub y_m: f64,
+    /// Heading at its start, rad.
+    pub heading_rad: f64,
+    /// Length, m.
+    pub length_m: f64,
+    /// What it is.
+    pub shape: Shape,
+}
+
+/// Point and derivatives of a plan curve with respect to station.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Jet {
+    /// Point (x, y), m.
+    pub point: [f64; 2],
+    /// First derivative; unit length where the parameter is arc length.
+    pub first: [f64; 2],
+    /// Second derivative, 1/m.
+    pub second: [f64; 2],
+}
+
+impl Jet {
+    /// Direction of travel, rad, in (-π, π].
+    #[must_use]
+    pub fn heading_rad(&self) -> f64 {
+        libm::atan2(self.first[1], self.first[0])
+    }
+
+    /// Curvature, 1/m, positive left.
+    #[must_use]
+    pub fn curvature_1_m(&self) -> f64 {
+        let ([x1, y1], [x2, y2]) = (self.first, self.second);
+        let q = x1 * x1 + y1 * y1;
+        (x1 * y2 - y1 * x2) / (q * libm::sqrt(q))
+    }
+}
+
+impl Placed {
+    /// The element at `ds_m` metres from its start.
+    #[must_use]
+    pub fn at(&self, ds_m: f64) -> Jet {
+        let local = self.shape.local(ds_m, self.length_m);
+        let (sin, cos) = libm::sincos(self.heading_rad);
+        let turn = |[u, v]: [f64; 2]| [cos * u - sin * v, sin * u + cos * v];
+        let [x, y] = turn(local.point);
+        Jet {
+            point: [self.x_m + x, self.y_m + y],
+            first: turn(local.first),
+            second: turn(local.second),
+        }
+    }
+}
+
+impl Shape {
+    /// Point and derivatives in the element's own axes.
+    fn local(&self, ds: f64, length: f64) -> Jet {
+        match *self {
+            Self::Line => Jet { point: [ds, 0.0], first: [1.0, 0.0], second: [0.0, 0.0] },
+            Self::Arc { curvature_1_m: k } => clothoid(k, 0.0, ds),
+            Self::Spiral { start_1_m, end_1_m } => {
+                clothoid(start_1_m, (end_1_m - start_1_m) / length, ds)
+            }
+            Self::Poly3 { v } => {
+                let speed = |u: f64| libm::hypot(1.0, slope(v, u));
+                let u = invert_arc_length(speed, ds, ds);
+                by_arc_length([u, cubic(v, u)], [1.0, slope(v, u)], [0.0, bend(v, u)], 1.0)
+            }
+            Self::ParamPoly3 { u, v, normalized: false } => Jet {
+                point: [cubic(u, ds), cubic(v, ds)],
+                first: [slope(u, ds), slope(v, ds)],
+                second: [bend(u, ds), bend(v, ds)],
+            },
+            Self::ParamPoly3 { u, v, normalized: true } => {
+                let speed = |p: f64| libm::hypot(slope(u, p), slope(v, p));
+                let total = integrate(speed, 0.0, 1.0);
+                // The whole curve is driven over the stated length, so that its end is met.
+                let scale = total / length;
+                let p = invert_arc_length(speed, ds * scale, ds / length);
+                by_arc_length(
+                    [cubic(u, p), cubic(v, p)],
+                    [slope(u, p), slope(v, p)],
+                    [bend(u, p), bend(v, p)],
+                    scale,
+                )
+            }
+        }
+    }
+}
+
+fn cubic([a, b, c, d]: [f64; 4], p: f64) -> f64 {
+    a + p * (b + p * (c + p * d))
+}
+
+fn slope([_, b, c, d]: [f64; 4], p: f64) -> f64 {
+    b + p * (2.0 * c + p * 3.0 * d)
+}
+
+fn bend([_, _, c, d]: [f64; 4], p: f64) -> f64 {
+    2.0 * c + 6.0 * d * p
+}
+
+/// Turns derivatives by a parameter `p` into those by station, where one metre of station is
+/// `scale` metres of curve: `T = c'/|c'|`, curvature vector `(c'' - (c''·T) T)/|c'|²`.
+fn by_arc_length(point: [f64; 2], d1: [f64; 2], d2: [f64; 2], scale: f64) -> Jet {
+    let q = (d1[0] * d1[0] + d1[1] * d1[1]).max(1e-24);
+    let speed = libm::sqrt(q);
+    let t = [d1[0] / speed, d1[1] / speed];
+    let along = d2[0] * t[0] + d2[1] * t[1];
+    let n = [(d2[0] - along * t[0]) / q, (d2[1] - along * t[1]) / q];
+    Jet {
+        point,
+        first: [t[0] * scale, t[1] * scale],
+        second: [n[0] * scale * scale, n[1] * scale * scale],
+    }
+}
+
+/// Clothoid from the origin along the u axis: curvature `k + dk s`.
+fn clothoid(k: f64, dk: f64, s: f64) -> Jet {
+    let theta = |s: f64| s * (k + 0.5 * dk * s);
+    let (sin, cos) = libm::sincos(theta(s));
+    let kappa = k + dk * s;
+    let first = [cos, sin];
+    let second = [-kappa * sin, kappa * cos];
+    if dk == 0.0 && libm::fabs(k * s) > 1e-3 {
+        return Jet { point: [sin / k, (1.0 - cos) / k], first, second };
+    }
+    let turned = libm::fabs(k * s) + 0.5 * libm::fabs(dk) * s * s;
+    let panels = libm::ceil(turned / 0.4).clamp(1.0, 1e4) as usize;
+    let h = s / panels as f64;
+    let mut point = [0.0, 0.0];
+    for i in 0..panels {
+        let mid = (i as f64 + 0.5) * h;
+        for (x, w) in GAUSS_8 {
+            for at in [mid - 0.5 * h * x, mid + 0.5 * h * x] {
+                let (sin, cos) = libm::sincos(theta(at));
+                point[0] += 0.5 * h * w * cos;
+                point[1] += 0.5 * h * w * sin;
+            }
+        }
+    }
+    Jet { point, first, second }
+}
+
+/// Positive abscissae and weights of the 8-point Gauss-Legendre rule (Abramowitz and Stegun 25.4).
+const GAUSS_8: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
+    (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
+];
+
+fn integrate(f: impl Fn(f64) -> f64, a: f64, b: f64) -> f64 {
+    const PANELS: usize = 8;
+    let h = (b - a) / PANELS as f64;
+    let mut sum = 0.0;
+    for i in 0..PANELS {
+        let mid = a + (i as f64 + 0.5) * h;
+        for (x, w) in GAUSS_8 {
+            sum += 0.5 * h * w * (f(mid - 0.5 * h * x) + f(mid + 0.5 * h * x));
+        }
+    }
+    sum
+}
+
+/// The parameter at which the arc length from 0 is `arc`: Newton, held inside a bracket.
+fn invert_arc_length(speed: impl Fn(f64) -> f64, arc: f64, guess: f64) -> f64 {
+    let (mut low, mut high) = if arc >= 0.0 { (0.0, f64::MAX) } else { (f64::MIN, 0.0) };
+    let mut p = guess;
+    for _ in 0..40 {
+        let excess = integrate(&speed, 0.0, p) - arc;
+        if libm::fabs(excess) <= 1e-12 * (1.0 + libm::fabs(arc)) {
+            break;
+        }
+        if excess > 0.0 {
+            high = p
+        } else {
+            low = p
+        }
+        let newton = p - excess / speed(p).max(1e-9);
+        let inside = newton > low && newton < high;
+        p = if inside || high == f64::MAX || low == f64::MIN { newton } else { 0.5 * (low + high) };
+        if !p.is_finite() {
+            return guess;
+        }
+    }
+    p
+}
