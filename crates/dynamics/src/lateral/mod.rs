@@ -13,6 +13,8 @@
 //! | `yaw_sideslip` | Eq. 3-10 of the paper, corrected: the 4-state model |
 //! | `steering` | hand wheel to road wheel: limits, offset, free play, ratio, lag |
 //! | `limits` | articulation stop, load transfer, rollover threshold |
+//! | `interface` | state, inputs, outputs |
+//! | `rosenbrock` | the integration method's linear systems |
 //! | `model` | all of them in one step, from standstill to the stability limit |
 //!
 //! Frames: ISO 8855 (x forward, y left, yaw counter-clockwise). Reference point: centre of the
@@ -22,20 +24,20 @@
 //! Left out: roll and pitch dynamics, tyre relaxation length, left-right differences, steering
 //! compliance, longitudinal load transfer.
 
+mod interface;
 mod kinematic;
 mod limits;
 mod model;
 mod parameters;
+mod rosenbrock;
 mod steering;
 mod tyre;
 mod yaw_sideslip;
 
+pub use interface::{BodyForce, LateralInputs, LateralOutputs, LateralState};
 pub use kinematic::{EffectiveLengths, Kinematic};
 pub use limits::{LoadTransfer, LoadTransferParameters};
-pub use model::{
-    BLEND_HIGH_M_S, BLEND_LOW_M_S, BodyForce, LateralInputs, LateralModel, LateralOutputs,
-    LateralState,
-};
+pub use model::{BLEND_HIGH_M_S, BLEND_LOW_M_S, LateralModel};
 pub use parameters::{
     LateralError, LateralParameters, PayloadParameters, TractorParameters, TrailerParameters,
 };

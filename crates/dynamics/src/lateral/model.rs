@@ -7,111 +7,23 @@
 //! pose integrate the mixed velocities, so that nothing jumps when the truck stops, starts or
 //! reverses.
 //!
-//! Integration: ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), an
-//! L-stable, linearly implicit method of order 2 that stays of order 2 with an approximate Jacobian;
-//! the Jacobian is the linear model's. Steps up to 10 ms are accurate to better than 1e-3 of the
-//! response; no step length or speed makes it unstable because of tyre stiffness.
+//! Integration: ROS2 (`rosenbrock`), linearly implicit: no step length or speed makes it unstable
+//! because of tyre stiffness; steps up to 10 ms are accurate to better than 1e-3 of the response.
 //!
 //! Left out: small-angle geometry is kept above the blend (articulation beyond 0.3 rad at speed is
 //! outside the model), and side forces do not move the kinematic model.
 
-use serde::{Deserialize, Serialize};
-
-use super::yaw_sideslip::{Force3, Loads};
+use super::rosenbrock::{ROS2, Solver, mass_times};
+use super::yaw_sideslip::Loads;
 use super::{
-    AXLES, Kinematic, LateralError, LateralParameters, LoadTransfer, StateSpace,
-    SteeringParameters, SteeringState, YawSideslip,
+    AXLES, Kinematic, LateralError, LateralInputs, LateralOutputs, LateralParameters, LateralState,
+    LoadTransfer, StateSpace, SteeringParameters, YawSideslip,
 };
 
 /// Speed below which the motion is kinematic, m/s.
 pub const BLEND_LOW_M_S: f64 = 1.0;
 /// Speed above which the motion is that of the 4-state model, m/s.
 pub const BLEND_HIGH_M_S: f64 = 3.0;
-/// `1 - 1/sqrt(2)`: the method's parameter (L-stable).
-const ROS2: f64 = 1.0 - core::f64::consts::FRAC_1_SQRT_2;
-
-/// What the lateral model remembers. Position and heading are those of the reference point.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct LateralState {
-    /// Map x, m.
-    pub x_m: f64,
-    /// Map y, m.
-    pub y_m: f64,
-    /// Tractor heading, rad, not wrapped.
-    pub yaw_rad: f64,
-    /// Trailer heading minus tractor heading, rad.
-    pub articulation_rad: f64,
-    /// v_yc: lateral speed of the tractor's CG in the 4-state model, m/s. Below the blend
-    /// [`LateralModel::outputs`] has the true one.
-    pub cg_lateral_speed_m_s: f64,
-    /// omega_c of the 4-state model, rad/s.
-    pub yaw_rate_rad_s: f64,
-    /// omega_t of the 4-state model, rad/s.
-    pub trailer_yaw_rate_rad_s: f64,
-    /// Steering gear.
-    pub steering: SteeringState,
-}
-
-/// A side force at and a yaw moment about a body's CG.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct BodyForce {
-    /// Force along the body's y axis, N.
-    pub side_n: f64,
-    /// Yaw moment, Nm.
-    pub yaw_moment_nm: f64,
-}
-
-/// What acts on the truck during one step.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct LateralInputs {
-    /// Longitudinal speed, m/s; negative backwards.
-    pub speed_m_s: f64,
-    /// Its time derivative, m/s².
-    pub accel_x_m_s2: f64,
-    /// Demanded hand-wheel angle, rad, positive left.
-    pub steering_wheel_rad: f64,
-    /// Grade, rad, positive uphill.
-    pub grade_rad: f64,
-    /// Bank, rad, positive with the left side up.
-    pub bank_rad: f64,
-    /// Wind and other external loads on the tractor.
-    pub tractor: BodyForce,
-    /// Wind and other external loads on the trailer.
-    pub trailer: BodyForce,
-    /// Longitudinal tyre force per axle along its body, N, positive drives.
-    pub axle_longitudinal_force_n: [f64; AXLES],
-}
-
-/// What the model tells others.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct LateralOutputs {
-    /// Lateral speed of the reference point, m/s, body y.
-    pub lateral_speed_m_s: f64,
-    /// Lateral acceleration of the reference point, m/s², body y (no gravity).
-    pub accel_y_m_s2: f64,
-    /// Lateral acceleration of the tractor's CG, m/s².
-    pub tractor_accel_y_m_s2: f64,
-    /// Lateral acceleration of the trailer's CG in tractor axes, m/s².
-    pub trailer_accel_y_m_s2: f64,
-    /// Tractor yaw rate, rad/s.
-    pub yaw_rate_rad_s: f64,
-    /// Trailer yaw rate, rad/s.
-    pub trailer_yaw_rate_rad_s: f64,
-    /// Tractor yaw acceleration, rad/s².
-    pub yaw_accel_rad_s2: f64,
-    /// Trailer heading minus tractor heading, rad.
-    pub articulation_rad: f64,
-    /// Road-wheel angle, rad.
-    pub road_wheel_rad: f64,
-    /// Slip angle per axle, rad, positive when it gives a force to the left.
-    pub slip_rad: [f64; AXLES],
-    /// Side force per axle, N, to the left.
-    pub side_force_n: [f64; AXLES],
-    /// Lateral force of the trailer on the tractor at the hitch, N, along the tractor's y axis.
-    pub hitch_force_n: f64,
-    /// Load-transfer ratio; 1 = all load on the right wheels.
-    pub load_transfer_ratio: f64,
-}
 
 /// The lateral model of one truck in one loading state.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -130,14 +42,6 @@ struct Motion {
     lateral_speed_m_s: f64,
     yaw_rate_rad_s: f64,
     trailer_yaw_rate_rad_s: f64,
-}
-
-impl LateralState {
-    /// Straight and without lateral motion at a pose of the reference point: m, m, rad.
-    #[must_use]
-    pub fn at(x_m: f64, y_m: f64, yaw_rad: f64) -> Self {
-        Self { x_m, y_m, yaw_rad, ..Self::default() }
-    }
 }
 
 impl LateralModel {
@@ -188,6 +92,30 @@ impl LateralModel {
     #[must_use]
     pub fn state_matrix(&self, v: f64) -> StateSpace {
         self.yaw_sideslip.state_space(v)
+    }
+
+    /// What a planner may know about handling.
+    #[must_use]
+    pub fn limits(&self) -> tractrix_core::LateralLimits {
+        let m = &self.yaw_sideslip;
+        let [c1, c2, c3, c4, c5, c6] = m.stiffness_n_rad;
+        let x = &m.axle_position_m;
+        tractrix_core::LateralLimits {
+            steering_ratio: self.steering.ratio,
+            steering_lag_s: self.steering.lag_s,
+            tractor_mass_kg: m.tractor_mass_kg,
+            tractor_inertia_kg_m2: m.tractor_inertia_kg_m2,
+            trailer_mass_kg: m.trailer_mass_kg,
+            trailer_inertia_kg_m2: m.trailer_inertia_kg_m2,
+            trailer_cg_behind_hitch_m: m.trailer_cg_behind_hitch_m,
+            drive_half_spread_m: 0.5 * (x[1] - x[2]),
+            trailer_half_spread_m: 0.5 * (x[5] - x[3]),
+            steer_stiffness_n_rad: c1,
+            drive_stiffness_n_rad: c2 + c3,
+            trailer_stiffness_n_rad: c4 + c5 + c6,
+            rollover_accel_m_s2: self.load_transfer.rollover_accel_m_s2(),
+            max_road_wheel_rad: self.steering.max_wheel_rad / self.steering.ratio,
+        }
     }
 
     /// State after `dt_s` (up to 10 ms for full accuracy), inputs held.
@@ -377,58 +305,4 @@ impl LateralModel {
 fn blend(speed_m_s: f64) -> f64 {
     let z = ((speed_m_s - BLEND_LOW_M_S) / (BLEND_HIGH_M_S - BLEND_LOW_M_S)).clamp(0.0, 1.0);
     z * z * (3.0 - 2.0 * z)
-}
-
-/// First three rows of `H k`.
-#[inline]
-fn mass_times(m: &YawSideslip, k: &[f64; 4]) -> Force3 {
-    let h = m.mass_matrix();
-    core::array::from_fn(|i| h[i][0] * k[0] + h[i][1] * k[1] + h[i][2] * k[2])
-}
-
-/// Factors of `H - c A_h` with the articulation eliminated: `k_4 = r + c w (k_2 - k_3)`.
-struct Solver {
-    /// Triangular factors of the 3x3 system; reciprocal pivots on the diagonal.
-    lu: [[f64; 3]; 3],
-    /// `c` times the articulation column of A_h.
-    gamma: Force3,
-    cw: f64,
-}
-
-impl Solver {
-    #[inline]
-    fn new(m: &YawSideslip, v: f64, specific_force: f64, c: f64, weight: f64) -> Self {
-        let (h, j) = (m.mass_matrix(), m.force_jacobian(v, specific_force));
-        let cw = c * weight;
-        let gamma: Force3 = core::array::from_fn(|i| c * j[i][3]);
-        let mut a: [[f64; 3]; 3] =
-            core::array::from_fn(|i| core::array::from_fn(|k| h[i][k] - c * j[i][k]));
-        for (row, g) in a.iter_mut().zip(gamma) {
-            row[1] -= cw * g;
-            row[2] += cw * g;
-        }
-        // The symmetric part is positive definite (mass and tyre damping): no pivoting needed.
-        a[0][0] = 1.0 / a[0][0];
-        for i in 1..3 {
-            a[i][0] *= a[0][0];
-            a[i][1] -= a[i][0] * a[0][1];
-            a[i][2] -= a[i][0] * a[0][2];
-        }
-        a[1][1] = 1.0 / a[1][1];
-        a[2][1] *= a[1][1];
-        a[2][2] = 1.0 / (a[2][2] - a[2][1] * a[1][2]);
-        Self { lu: a, gamma, cw }
-    }
-
-    #[inline]
-    fn solve(&self, g: Force3, r: f64) -> [f64; 4] {
-        let a = &self.lu;
-        let b: Force3 = core::array::from_fn(|i| g[i] + self.gamma[i] * r);
-        let y1 = b[1] - a[1][0] * b[0];
-        let y2 = b[2] - a[2][0] * b[0] - a[2][1] * y1;
-        let z = y2 * a[2][2];
-        let y = (y1 - a[1][2] * z) * a[1][1];
-        let x = (b[0] - a[0][1] * y - a[0][2] * z) * a[0][0];
-        [x, y, z, r + self.cw * (y - z)]
-    }
 }
