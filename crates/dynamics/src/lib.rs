@@ -1,3 +1,23 @@
 //! The truck: a list of effects, an integrator and truck files.
+//!
+//! [`TruckParameters`] is a truck file; [`TruckModel`] one truck in one loading state;
+//! [`TruckModel::step`] a pure function from state, command and road patch to the next state.
+//! Reference point: centre of the drive-axle group, on the ground. SI and radians; truck files use
+//! rpm where the field does.
 
+mod bounds;
+pub mod effects;
+mod error;
 pub mod lateral;
+mod model;
+mod output;
+mod parameters;
+mod state;
+
+pub use error::DynamicsError;
+pub use model::TruckModel;
+pub use output::PaperOutputs;
+pub use parameters::{
+    BodyParameters, InstrumentParameters, Overlay, OverlayValue, TruckParameters,
+};
+pub use state::{DelayLine, Forces, MAX_DELAY_S, RoadPatch, SUBSTEP_S, TruckState};

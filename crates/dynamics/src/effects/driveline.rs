@@ -1,0 +1,135 @@
+//! Clutch, gearbox, final drive, wheels: torque to force, efficiencies, rotating masses.
+//!
+//! With the clutch closed the engine turns with the wheels, `omega_e = v i_g i_0 / r`, and
+//! `F = T_net i_g i_0 / r * eta` when it drives, `/ eta` when it brakes; the rotating masses act
+//! as `(J_w + J_e (i_g i_0)^2) / r^2`. With the clutch slipping the engine is a separate inertia
+//! and the clutch passes its capacity.
+
+use serde::{Deserialize, Serialize};
+
+use crate::bounds::Bounds;
+
+/// The driveline block of a truck file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DrivelineParameters {
+    /// Where the figures come from.
+    pub source: String,
+    /// Gearbox ratios, first gear first.
+    pub gear_ratios: Vec<f64>,
+    /// Final drive ratio.
+    pub final_drive_ratio: f64,
+    /// Efficiency of the gearbox, 0 to 1.
+    pub gearbox_efficiency_frac: f64,
+    /// Efficiency of the final drive, 0 to 1.
+    pub axle_efficiency_frac: f64,
+    /// Factor on the driveline's losses, 1 = as given.
+    #[serde(default = "one")]
+    pub loss_scale_coeff: f64,
+    /// Dynamic wheel radius, m.
+    pub wheel_radius_m: f64,
+    /// Inertia of all wheels, kg m².
+    pub wheel_inertia_kg_m2: f64,
+    /// Largest torque of the clutch, Nm.
+    pub clutch_torque_nm: f64,
+    /// Time to close the clutch on launch, s.
+    pub clutch_closing_s: f64,
+    /// Gear for pulling away.
+    pub launch_gear: u8,
+    /// Secondary retarder: largest torque at the propeller shaft, Nm.
+    #[serde(default)]
+    pub retarder_torque_nm: f64,
+    /// Secondary retarder: largest power, W.
+    #[serde(default)]
+    pub retarder_power_w: f64,
+    /// Lag of the retarder, s.
+    #[serde(default = "retarder_lag_s")]
+    pub retarder_lag_s: f64,
+    /// Retarder torque at the propeller shaft that acts although nobody asked for it, Nm.
+    #[serde(default)]
+    pub hidden_retarder_torque_nm: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+fn retarder_lag_s() -> f64 {
+    0.6
+}
+
+impl DrivelineParameters {
+    pub(crate) fn violations(&self) -> Vec<String> {
+        let mut b = Bounds::of("driveline");
+        let n = self.gear_ratios.len();
+        b.require((1..=18).contains(&n), format!("gear_ratios: {n} gears, 1 to 18 are possible"));
+        let falling = self.gear_ratios.windows(2).all(|w| w[1] < w[0]);
+        b.require(falling, "gear_ratios must fall from gear to gear".into());
+        for &r in &self.gear_ratios {
+            b.within("gear_ratios", r, 0.3, 30.0);
+        }
+        b.within("final_drive_ratio", self.final_drive_ratio, 1.0, 10.0);
+        b.within("gearbox_efficiency_frac", self.gearbox_efficiency_frac, 0.5, 1.0);
+        b.within("axle_efficiency_frac", self.axle_efficiency_frac, 0.5, 1.0);
+        b.within("loss_scale_coeff", self.loss_scale_coeff, 0.0, 5.0);
+        b.within("wheel_radius_m", self.wheel_radius_m, 0.2, 1.0);
+        b.within("wheel_inertia_kg_m2", self.wheel_inertia_kg_m2, 0.0, 2_000.0);
+        b.within("clutch_torque_nm", self.clutch_torque_nm, 100.0, 20_000.0);
+        b.within("clutch_closing_s", self.clutch_closing_s, 0.05, 10.0);
+        b.within("launch_gear", f64::from(self.launch_gear), 1.0, n.max(1) as f64);
+        b.within("retarder_torque_nm", self.retarder_torque_nm, 0.0, 10_000.0);
+        b.within("retarder_power_w", self.retarder_power_w, 0.0, 1e6);
+        b.within("retarder_lag_s", self.retarder_lag_s, 0.005, 5.0);
+        b.within("hidden_retarder_torque_nm", self.hidden_retarder_torque_nm, 0.0, 5_000.0);
+        b.violations
+    }
+
+    /// Ratio engine to wheel in a gear (1-based); zero in neutral or outside the box.
+    #[must_use]
+    pub fn total_ratio(&self, gear: u8) -> f64 {
+        let i = usize::from(gear).wrapping_sub(1);
+        self.gear_ratios.get(i).map_or(0.0, |g| g * self.final_drive_ratio)
+    }
+
+    /// Efficiency engine to wheel.
+    #[must_use]
+    pub fn efficiency_frac(&self) -> f64 {
+        let loss = 1.0 - self.gearbox_efficiency_frac * self.axle_efficiency_frac;
+        (1.0 - self.loss_scale_coeff * loss).clamp(0.05, 1.0)
+    }
+
+    /// Wheel force of a crank torque through a gear, N.
+    #[must_use]
+    pub fn force_n(&self, crank_nm: f64, gear: u8) -> f64 {
+        let eta = self.efficiency_frac();
+        let raw = crank_nm * self.total_ratio(gear) / self.wheel_radius_m;
+        if crank_nm > 0.0 { raw * eta } else { raw / eta }
+    }
+
+    /// Engine speed with the clutch closed, rad/s.
+    #[must_use]
+    pub fn engine_speed_rad_s(&self, speed_m_s: f64, gear: u8) -> f64 {
+        speed_m_s * self.total_ratio(gear) / self.wheel_radius_m
+    }
+
+    /// Rotating masses felt at the wheels, kg; `gear` 0 = driveline open.
+    #[must_use]
+    pub fn rotating_mass_kg(&self, engine_inertia_kg_m2: f64, gear: u8) -> f64 {
+        let i = self.total_ratio(gear);
+        (self.wheel_inertia_kg_m2 + engine_inertia_kg_m2 * i * i)
+            / (self.wheel_radius_m * self.wheel_radius_m)
+    }
+
+    /// Largest retarder torque at the propeller shaft at a speed, Nm.
+    #[must_use]
+    pub fn retarder_limit_nm(&self, speed_m_s: f64) -> f64 {
+        let shaft_rad_s = speed_m_s.abs() * self.final_drive_ratio / self.wheel_radius_m;
+        self.retarder_torque_nm.min(self.retarder_power_w / shaft_rad_s.max(1.0))
+            * (shaft_rad_s / 40.0).min(1.0)
+    }
+
+    /// Wheel force of a torque at the propeller shaft, N.
+    #[must_use]
+    pub fn shaft_force_n(&self, shaft_nm: f64) -> f64 {
+        shaft_nm * self.final_drive_ratio / self.wheel_radius_m
+    }
+}

@@ -1,0 +1,298 @@
+//! Diesel engine: full load, friction, torque build-up, governors, derating, fuel.
+//!
+//! | symbol | meaning |
+//! |---|---|
+//! | n | engine speed, rpm in the truck file, rad/s inside |
+//! | T_full(n) | full-load brake torque, Nm |
+//! | T_f = f0 + f1 n | friction torque, Nm |
+//! | T_ind | indicated (gas) torque; brake torque is T_ind - T_f |
+//!
+//! The demand of a pedal is `pedal (T_full + T_f)` (an all-torque pedal), or a map over pedal and
+//! speed where the truck file gives one. The cylinder charge follows with two first-order lags:
+//! a fast one below `lag_threshold_frac` of full load, a slow one (turbocharger) above it.
+//! J1939 SPN 513 is T_ind over the reference torque.
+//!
+//! Left out: cylinder cut-off, exhaust after-treatment, cold-start enrichment.
+
+use serde::{Deserialize, Serialize};
+use tractrix_core::{Curve, FuelModel, Grid, RPM_PER_RAD_S};
+
+use crate::bounds::Bounds;
+
+/// The engine block of a truck file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EngineParameters {
+    /// Where the figures come from.
+    pub source: String,
+    /// Speeds of the full-load curve, rpm.
+    pub full_load_speed_rpm: Vec<f64>,
+    /// Full-load brake torque at those speeds, Nm.
+    pub full_load_torque_nm: Vec<f64>,
+    /// Friction torque at standstill, Nm (f0).
+    pub friction_constant_nm: f64,
+    /// Friction torque per speed, Nm/rpm (f1).
+    pub friction_per_rpm_nm: f64,
+    /// Factor on the friction torque, 1 = as given.
+    #[serde(default = "one")]
+    pub friction_scale_coeff: f64,
+    /// Reference torque of the torque signals, Nm (SPN 544).
+    pub reference_torque_nm: f64,
+    /// Idle speed, rpm.
+    pub idle_speed_rpm: f64,
+    /// Governed speed at which the torque has fallen to zero, rpm.
+    pub max_speed_rpm: f64,
+    /// Inertia of crank, flywheel and clutch, kg m².
+    pub inertia_kg_m2: f64,
+    /// Lag of torque below the threshold, s.
+    pub fast_lag_s: f64,
+    /// Lag of torque above the threshold, s (turbocharger).
+    pub slow_lag_s: f64,
+    /// Share of full load at which the lag changes.
+    pub lag_threshold_frac: f64,
+    /// Dead time from pedal to demand, s.
+    pub pedal_delay_s: f64,
+    /// Largest rise of the torque demand, Nm/s; none = unlimited.
+    #[serde(default)]
+    pub torque_rise_nm_s: Option<f64>,
+    /// Largest fall of the torque demand, Nm/s; none = unlimited.
+    #[serde(default)]
+    pub torque_fall_nm_s: Option<f64>,
+    /// Demand map: indicated torque over pedal and speed, instead of the all-torque pedal.
+    #[serde(default)]
+    pub pedal_map: Option<PedalMap>,
+    /// Power of the auxiliaries at the crank, W.
+    pub auxiliary_power_w: f64,
+    /// Power of the cooling fan while it runs, W.
+    #[serde(default)]
+    pub fan_power_w: f64,
+    /// Coolant temperature above which the fan runs, K.
+    #[serde(default = "fan_on_k")]
+    pub fan_on_k: f64,
+    /// Altitude above which full load falls, m.
+    #[serde(default = "derate_altitude_m")]
+    pub derate_altitude_m: f64,
+    /// Loss of full load per metre above it, 1/m.
+    #[serde(default)]
+    pub derate_altitude_1_m: f64,
+    /// Air temperature above which full load falls, K.
+    #[serde(default = "derate_air_k")]
+    pub derate_air_k: f64,
+    /// Loss of full load per kelvin above it, 1/K.
+    #[serde(default)]
+    pub derate_air_1_k: f64,
+    /// Engine-brake torque at full demand, constant part, Nm.
+    pub engine_brake_constant_nm: f64,
+    /// Engine-brake torque at full demand per speed, Nm/rpm.
+    pub engine_brake_per_rpm_nm: f64,
+    /// Lag of the engine brake, s.
+    pub engine_brake_lag_s: f64,
+    /// Fuel.
+    pub fuel: FuelParameters,
+}
+
+/// Demand over pedal and speed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PedalMap {
+    /// Pedal positions, 0 to 1.
+    pub pedal_frac: Vec<f64>,
+    /// Speeds, rpm.
+    pub speed_rpm: Vec<f64>,
+    /// Indicated torque, Nm: one row per speed, one value per pedal position.
+    pub torque_nm: Vec<Vec<f64>>,
+}
+
+/// Fuel: Willans line on indicated power.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FuelParameters {
+    /// Constant part, g/s.
+    pub constant_g_s: f64,
+    /// Part per speed, g/s per rpm.
+    pub per_rpm_g_s: f64,
+    /// Part per indicated power, g/s per kW.
+    pub per_kw_g_s: f64,
+    /// Extra consumption at low load, relative, fading out towards `low_load_kw`.
+    #[serde(default)]
+    pub low_load_extra_frac: f64,
+    /// Indicated power at which the extra has faded out, kW.
+    #[serde(default = "low_load_kw")]
+    pub low_load_kw: f64,
+    /// Density, kg/m³.
+    pub density_kg_m3: f64,
+}
+
+fn one() -> f64 {
+    1.0
+}
+fn fan_on_k() -> f64 {
+    367.0
+}
+fn derate_altitude_m() -> f64 {
+    1_500.0
+}
+fn derate_air_k() -> f64 {
+    308.15
+}
+fn low_load_kw() -> f64 {
+    80.0
+}
+
+impl EngineParameters {
+    pub(crate) fn violations(&self) -> Vec<String> {
+        let mut b = Bounds::of("engine");
+        b.curve("full_load_torque_nm", &self.full_load_speed_rpm, &self.full_load_torque_nm);
+        let torque_ok = self.full_load_torque_nm.iter().all(|t| (0.0..=10_000.0).contains(t));
+        b.require(torque_ok, "full_load_torque_nm must be within 0 to 10000".into());
+        b.within("friction_constant_nm", self.friction_constant_nm, 0.0, 1_000.0);
+        b.within("friction_per_rpm_nm", self.friction_per_rpm_nm, 0.0, 1.0);
+        b.within("friction_scale_coeff", self.friction_scale_coeff, 0.1, 5.0);
+        b.within("reference_torque_nm", self.reference_torque_nm, 100.0, 10_000.0);
+        b.within("idle_speed_rpm", self.idle_speed_rpm, 300.0, 1_000.0);
+        b.within("max_speed_rpm", self.max_speed_rpm, 1_200.0, 6_000.0);
+        b.within("inertia_kg_m2", self.inertia_kg_m2, 0.1, 30.0);
+        b.within("fast_lag_s", self.fast_lag_s, 0.005, 5.0);
+        b.within("slow_lag_s", self.slow_lag_s, 0.005, 10.0);
+        b.within("lag_threshold_frac", self.lag_threshold_frac, 0.0, 1.0);
+        b.within("pedal_delay_s", self.pedal_delay_s, 0.0, crate::state::MAX_DELAY_S);
+        b.within("torque_rise_nm_s", self.torque_rise_nm_s.unwrap_or(1.0), 1.0, 1e6);
+        b.within("torque_fall_nm_s", self.torque_fall_nm_s.unwrap_or(1.0), 1.0, 1e6);
+        b.within("auxiliary_power_w", self.auxiliary_power_w, 0.0, 60_000.0);
+        b.within("fan_power_w", self.fan_power_w, 0.0, 80_000.0);
+        b.within("fan_on_k", self.fan_on_k, 280.0, 450.0);
+        b.within("derate_altitude_m", self.derate_altitude_m, -500.0, 6_000.0);
+        b.within("derate_altitude_1_m", self.derate_altitude_1_m, 0.0, 1e-3);
+        b.within("derate_air_k", self.derate_air_k, 250.0, 350.0);
+        b.within("derate_air_1_k", self.derate_air_1_k, 0.0, 0.1);
+        b.within("engine_brake_constant_nm", self.engine_brake_constant_nm, 0.0, 5_000.0);
+        b.within("engine_brake_per_rpm_nm", self.engine_brake_per_rpm_nm, 0.0, 5.0);
+        b.within("engine_brake_lag_s", self.engine_brake_lag_s, 0.005, 5.0);
+        b.within("fuel.constant_g_s", self.fuel.constant_g_s, 0.0, 5.0);
+        b.within("fuel.per_rpm_g_s", self.fuel.per_rpm_g_s, 0.0, 0.01);
+        b.within("fuel.per_kw_g_s", self.fuel.per_kw_g_s, 0.01, 0.2);
+        b.within("fuel.low_load_extra_frac", self.fuel.low_load_extra_frac, -0.5, 2.0);
+        b.within("fuel.low_load_kw", self.fuel.low_load_kw, 1.0, 500.0);
+        b.within("fuel.density_kg_m3", self.fuel.density_kg_m3, 600.0, 1_000.0);
+        if let Some(map) = &self.pedal_map {
+            b.result("pedal_map", map.grid().map(|_| ()));
+        }
+        b.violations
+    }
+}
+
+impl PedalMap {
+    fn grid(&self) -> Result<Grid, tractrix_core::CoreError> {
+        let n: Vec<f64> = self.speed_rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
+        let rows = self.torque_nm.iter().flatten().copied().collect();
+        let by_speed = Grid::new("pedal_map", n, self.pedal_frac.clone(), rows)?;
+        let z = by_speed
+            .y()
+            .iter()
+            .flat_map(|&p| by_speed.x().iter().map(move |&n| (n, p)))
+            .map(|(n, p)| by_speed.at(n, p))
+            .collect();
+        Grid::new("pedal_map", by_speed.y().to_vec(), by_speed.x().to_vec(), z)
+    }
+}
+
+/// The engine with its tables in SI, ready to run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Engine {
+    /// The truck file's block.
+    pub parameters: EngineParameters,
+    /// Full-load brake torque over speed (rad/s), Nm.
+    pub full_load_nm: Curve,
+    /// Demand over (pedal, speed rad/s), Nm, if the truck file gives one.
+    pub pedal_map_nm: Option<Grid>,
+    /// Idle speed, rad/s.
+    pub idle_rad_s: f64,
+    /// Governed speed, rad/s.
+    pub max_rad_s: f64,
+}
+
+impl Engine {
+    /// Builds the tables; the parameters have been checked.
+    pub(crate) fn new(p: EngineParameters) -> Result<Self, tractrix_core::CoreError> {
+        let speed = p.full_load_speed_rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
+        Ok(Self {
+            full_load_nm: Curve::new("full_load_torque_nm", speed, p.full_load_torque_nm.clone())?,
+            pedal_map_nm: p.pedal_map.as_ref().map(PedalMap::grid).transpose()?,
+            idle_rad_s: p.idle_speed_rpm / RPM_PER_RAD_S,
+            max_rad_s: p.max_speed_rpm / RPM_PER_RAD_S,
+            parameters: p,
+        })
+    }
+
+    /// Friction torque T_f, Nm, positive.
+    #[must_use]
+    pub fn friction_nm(&self, speed_rad_s: f64) -> f64 {
+        let p = &self.parameters;
+        p.friction_scale_coeff
+            * (p.friction_constant_nm + p.friction_per_rpm_nm * speed_rad_s * RPM_PER_RAD_S)
+    }
+
+    /// Full-load brake torque with altitude and heat derating, Nm.
+    #[must_use]
+    pub fn full_load_at_nm(&self, speed_rad_s: f64, altitude_m: f64, air_k: f64) -> f64 {
+        let p = &self.parameters;
+        let thin = p.derate_altitude_1_m * (altitude_m - p.derate_altitude_m).max(0.0);
+        let hot = p.derate_air_1_k * (air_k - p.derate_air_k).max(0.0);
+        self.full_load_nm.at(speed_rad_s) * ((1.0 - thin).max(0.0) * (1.0 - hot).max(0.0))
+    }
+
+    /// Indicated torque that a pedal demands, Nm.
+    #[must_use]
+    pub fn pedal_demand_nm(&self, pedal_frac: f64, speed_rad_s: f64, full_load_nm: f64) -> f64 {
+        match &self.pedal_map_nm {
+            Some(map) => map.at(pedal_frac, speed_rad_s.max(self.idle_rad_s)),
+            None => pedal_frac * (full_load_nm + self.friction_nm(speed_rad_s)),
+        }
+    }
+
+    /// Lag of the torque at a level, s.
+    #[must_use]
+    pub fn lag_s(&self, indicated_nm: f64, full_load_nm: f64) -> f64 {
+        let p = &self.parameters;
+        let low = indicated_nm <= p.lag_threshold_frac * full_load_nm;
+        if low { p.fast_lag_s } else { p.slow_lag_s }
+    }
+
+    /// Torque that the auxiliaries take from the crank, Nm.
+    #[must_use]
+    pub fn auxiliary_nm(&self, speed_rad_s: f64, coolant_k: f64) -> f64 {
+        let p = &self.parameters;
+        let fan_w = if coolant_k > p.fan_on_k { p.fan_power_w } else { 0.0 };
+        (p.auxiliary_power_w + fan_w) / speed_rad_s.max(0.5 * self.idle_rad_s)
+    }
+
+    /// Engine-brake torque at full demand, Nm, positive.
+    #[must_use]
+    pub fn engine_brake_nm(&self, speed_rad_s: f64) -> f64 {
+        let p = &self.parameters;
+        if speed_rad_s < 1.2 * self.idle_rad_s {
+            return 0.0;
+        }
+        p.engine_brake_constant_nm + p.engine_brake_per_rpm_nm * speed_rad_s * RPM_PER_RAD_S
+    }
+
+    /// Fuel flow, g/s: Willans line of [`FuelModel`] plus the low-load extra.
+    #[must_use]
+    pub fn fuel_rate_g_s(&self, speed_rad_s: f64, indicated_nm: f64) -> f64 {
+        let f = &self.parameters.fuel;
+        let kw = indicated_nm * speed_rad_s * 1e-3;
+        let extra = f.low_load_extra_frac * (1.0 - kw / f.low_load_kw).max(0.0);
+        self.fuel_model().rate_g_s(speed_rad_s, indicated_nm, 0.0) * (1.0 + extra)
+    }
+
+    /// The fuel model as a planner sees it.
+    #[must_use]
+    pub const fn fuel_model(&self) -> FuelModel {
+        let f = &self.parameters.fuel;
+        FuelModel::Willans {
+            constant_g_s: f.constant_g_s,
+            per_rpm_g_s: f.per_rpm_g_s,
+            per_kw_g_s: f.per_kw_g_s,
+        }
+    }
+}

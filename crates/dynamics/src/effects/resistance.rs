@@ -1,0 +1,144 @@
+//! Forces that resist motion: rolling, air, grade, curve.
+//!
+//! ```text
+//! F_roll  = m g cos(grade) (f0 + f1 v) k(T)            k: tyre warm-up, 1 when warm
+//! F_air   = 1/2 rho CdA (1 + k_y |beta|) V^2 cos(beta)  V, beta: air flow relative to the truck
+//! F_side  = 1/2 rho A_side c_side beta V^2              crosswind, a share of it on the tractor
+//! F_grade = m g sin(grade)
+//! F_curve = sum F_y alpha                               induced drag of the side forces
+//! ```
+//! Sources: VECTO air drag model (yaw dependence), ISO 28580 (rolling), Hyttinen 2022 (warm-up).
+
+use serde::{Deserialize, Serialize};
+use tractrix_core::{GAS_CONSTANT_AIR_J_KG_K, GRAVITY_M_S2};
+
+use crate::bounds::Bounds;
+
+/// The resistance block of a truck file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResistanceParameters {
+    /// Where the figures come from.
+    pub source: String,
+    /// Rolling resistance coefficient f0, warm tyres.
+    pub rolling_coeff: f64,
+    /// Growth of the coefficient with speed f1, s/m.
+    #[serde(default)]
+    pub rolling_per_speed_s_m: f64,
+    /// Extra rolling resistance of cold tyres at the start, relative.
+    #[serde(default)]
+    pub cold_tyre_extra_frac: f64,
+    /// Time constant of the tyres' warm-up, s.
+    #[serde(default = "warmup_s")]
+    pub tyre_warmup_s: f64,
+    /// Constant extra force (a dragging brake), N.
+    #[serde(default)]
+    pub parasitic_force_n: f64,
+    /// Drag area CdA, m².
+    pub drag_area_m2: f64,
+    /// Growth of CdA per radian of air yaw, 1/rad.
+    pub drag_yaw_1_rad: f64,
+    /// Side area times side-force slope, m²/rad.
+    pub side_force_area_m2_rad: f64,
+    /// Share of the side force that acts on the tractor.
+    pub side_force_tractor_frac: f64,
+    /// Head wind that blows against the truck wherever it goes, m/s (a fault of the map of wind).
+    #[serde(default)]
+    pub headwind_m_s: f64,
+}
+
+fn warmup_s() -> f64 {
+    1_500.0
+}
+
+/// Air flow as the truck feels it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AirFlow {
+    /// Component against the direction of travel, m/s.
+    pub head_m_s: f64,
+    /// Component across, m/s; positive blows to the left.
+    pub cross_m_s: f64,
+    /// Density, kg/m³.
+    pub density_kg_m3: f64,
+}
+
+impl AirFlow {
+    /// Flow of a wind (map frame, blowing towards) over a truck that drives along `yaw_rad`.
+    #[must_use]
+    pub fn over(
+        speed_m_s: f64,
+        yaw_rad: f64,
+        wind_m_s: (f64, f64),
+        density_kg_m3: f64,
+        headwind_m_s: f64,
+    ) -> Self {
+        let (along, across) = if wind_m_s == (0.0, 0.0) {
+            (0.0, 0.0)
+        } else {
+            let (sin, cos) = libm::sincos(yaw_rad);
+            (wind_m_s.0 * cos + wind_m_s.1 * sin, wind_m_s.1 * cos - wind_m_s.0 * sin)
+        };
+        Self { head_m_s: speed_m_s - along + headwind_m_s, cross_m_s: across, density_kg_m3 }
+    }
+
+    fn yaw_rad(&self) -> f64 {
+        if self.cross_m_s == 0.0 { 0.0 } else { libm::atan2(self.cross_m_s, self.head_m_s.abs()) }
+    }
+
+    fn squared(&self) -> f64 {
+        self.head_m_s * self.head_m_s + self.cross_m_s * self.cross_m_s
+    }
+}
+
+/// Density of dry air, kg/m³ (ideal gas).
+#[must_use]
+pub fn air_density_kg_m3(pressure_pa: f64, temperature_k: f64) -> f64 {
+    pressure_pa / (GAS_CONSTANT_AIR_J_KG_K * temperature_k)
+}
+
+impl ResistanceParameters {
+    pub(crate) fn violations(&self) -> Vec<String> {
+        let mut b = Bounds::of("resistance");
+        b.within("rolling_coeff", self.rolling_coeff, 0.0, 0.05);
+        b.within("rolling_per_speed_s_m", self.rolling_per_speed_s_m, 0.0, 1e-3);
+        b.within("cold_tyre_extra_frac", self.cold_tyre_extra_frac, 0.0, 2.0);
+        b.within("tyre_warmup_s", self.tyre_warmup_s, 10.0, 20_000.0);
+        b.within("parasitic_force_n", self.parasitic_force_n, 0.0, 50_000.0);
+        b.within("drag_area_m2", self.drag_area_m2, 0.0, 20.0);
+        b.within("drag_yaw_1_rad", self.drag_yaw_1_rad, 0.0, 10.0);
+        b.within("side_force_area_m2_rad", self.side_force_area_m2_rad, 0.0, 500.0);
+        b.within("side_force_tractor_frac", self.side_force_tractor_frac, 0.0, 1.0);
+        b.within("headwind_m_s", self.headwind_m_s, -30.0, 30.0);
+        b.violations
+    }
+
+    /// Rolling resistance plus the parasitic force, N, positive; acts against the motion.
+    /// `warmth` runs from 0 (cold) to 1 (warm).
+    #[must_use]
+    pub fn rolling_n(&self, mass_kg: f64, speed_m_s: f64, cos_grade: f64, warmth: f64) -> f64 {
+        let coeff = self.rolling_coeff + self.rolling_per_speed_s_m * speed_m_s.abs();
+        let cold = 1.0 + self.cold_tyre_extra_frac * (1.0 - warmth);
+        mass_kg * GRAVITY_M_S2 * cos_grade * coeff * cold + self.parasitic_force_n
+    }
+
+    /// Air drag, N; positive against forward motion.
+    #[must_use]
+    pub fn drag_n(&self, air: &AirFlow) -> f64 {
+        let beta = air.yaw_rad();
+        let cos_beta = if beta == 0.0 { 1.0 } else { libm::cos(beta) };
+        let area = self.drag_area_m2 * (1.0 + self.drag_yaw_1_rad * beta.abs());
+        0.5 * air.density_kg_m3
+            * area
+            * air.squared()
+            * cos_beta
+            * if air.head_m_s < 0.0 { -1.0 } else { 1.0 }
+    }
+
+    /// Side forces of the wind on (tractor, trailer), N, positive to the left.
+    #[must_use]
+    pub fn side_n(&self, air: &AirFlow) -> (f64, f64) {
+        let total =
+            0.5 * air.density_kg_m3 * self.side_force_area_m2_rad * air.yaw_rad() * air.squared();
+        (total * self.side_force_tractor_frac, total * (1.0 - self.side_force_tractor_frac))
+    }
+}

@@ -1,0 +1,213 @@
+//! What the truck reports, and what a planner may know about it.
+
+use tractrix_core::{
+    BrakeLimits, Curve, EgoState, GRAVITY_M_S2, Geometry, LateralLimits, PowertrainLimits,
+    PowertrainSignals, RPM_PER_RAD_S, RoadLoad, TrailerState, VehicleLimits,
+};
+
+use crate::effects::resistance::air_density_kg_m3;
+use crate::effects::shift::ShiftPhase;
+use crate::{DynamicsError, RoadPatch, TruckModel, TruckState};
+
+/// The paper's 16 outputs of the truck model (Table I and the released interface), in SI.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct PaperOutputs {
+    /// Engaged gear, 0 = neutral (GearPos).
+    pub gear: u8,
+    /// Service brakes at work (foundation_brake_in_use).
+    pub foundation_brake_in_use: bool,
+    /// Engine torque before friction, Nm (EngTrq).
+    pub engine_torque_nm: f64,
+    /// Engine speed, rad/s (EngSpd).
+    pub engine_speed_rad_s: f64,
+    /// Friction torque over the reference torque (engine_torque_loss_percent / 100).
+    pub engine_torque_loss_frac: f64,
+    /// A shift is in progress (shift_in_process).
+    pub shift_in_progress: bool,
+    /// Engine torque over the reference torque (engine_torque_percent / 100).
+    pub engine_torque_frac: f64,
+    /// Longitudinal speed, m/s (Velong).
+    pub speed_m_s: f64,
+    /// Lateral speed, m/s (Velate).
+    pub lateral_speed_m_s: f64,
+    /// Heading, rad (Yaw).
+    pub yaw_rad: f64,
+    /// Yaw rate, rad/s (YawRate).
+    pub yaw_rate_rad_s: f64,
+    /// Wheel speed, rad/s (Omega_w).
+    pub wheel_speed_rad_s: f64,
+    /// Longitudinal acceleration, m/s² (ax).
+    pub accel_x_m_s2: f64,
+    /// Map x, m (X).
+    pub x_m: f64,
+    /// Map y, m (Y).
+    pub y_m: f64,
+    /// Articulation angle, rad: the trailer that the released model lacks.
+    pub articulation_rad: f64,
+}
+
+impl TruckModel {
+    /// The ego state of a truck state, in road coordinates left at zero (the road knows them).
+    #[must_use]
+    pub fn ego_state(&self, s: &TruckState, patch: &RoadPatch) -> EgoState {
+        let lateral = self.lateral_outputs(s, patch);
+        let friction_nm = self.engine.friction_nm(s.engine_speed_rad_s);
+        EgoState {
+            x_m: s.lateral.x_m,
+            y_m: s.lateral.y_m,
+            yaw_rad: s.lateral.yaw_rad,
+            speed_m_s: s.speed_m_s,
+            lateral_speed_m_s: lateral.lateral_speed_m_s,
+            accel_x_m_s2: s.accel_m_s2,
+            accel_y_m_s2: lateral.accel_y_m_s2,
+            yaw_rate_rad_s: lateral.yaw_rate_rad_s,
+            trailer: TrailerState {
+                articulation_rad: lateral.articulation_rad,
+                yaw_rate_rad_s: lateral.trailer_yaw_rate_rad_s,
+            },
+            road_wheel_rad: lateral.road_wheel_rad,
+            steering_wheel_rad: s.lateral.steering.wheel_rad,
+            load_transfer_ratio: lateral.load_transfer_ratio,
+            powertrain: PowertrainSignals {
+                engine_speed_rad_s: s.engine_speed_rad_s,
+                engine_torque_nm: s.engine_torque_nm,
+                engine_friction_torque_nm: friction_nm,
+                drive_force_n: s.forces.drive_n,
+                brake_force_n: s.forces.brake_n,
+                brake_pressure_pa: self.mean_pressure_pa(s),
+                retarder_force_n: s.forces.retarder_n,
+                gear: if s.shift.phase == ShiftPhase::Open { 0 } else { s.shift.gear },
+                shift_in_progress: s.shift.phase != ShiftPhase::Engaged,
+                fuel_rate_g_s: s.fuel_rate_g_s,
+                fuel_used_g: s.fuel_g,
+                engine_power_w: (s.engine_torque_nm - friction_nm - s.engine_brake_nm)
+                    * s.engine_speed_rad_s,
+            },
+            ..EgoState::default()
+        }
+    }
+
+    /// The paper's outputs.
+    #[must_use]
+    pub fn paper_outputs(&self, s: &TruckState, patch: &RoadPatch) -> PaperOutputs {
+        let e = self.ego_state(s, patch);
+        let reference = self.parameters.engine.reference_torque_nm;
+        PaperOutputs {
+            gear: e.powertrain.gear,
+            foundation_brake_in_use: s.brake.pressure_pa.iter().any(|&p| p > 1_000.0),
+            engine_torque_nm: s.engine_torque_nm,
+            engine_speed_rad_s: s.engine_speed_rad_s,
+            engine_torque_loss_frac: e.powertrain.engine_friction_torque_nm / reference,
+            shift_in_progress: e.powertrain.shift_in_progress,
+            engine_torque_frac: s.engine_torque_nm / reference,
+            speed_m_s: s.speed_m_s,
+            lateral_speed_m_s: e.lateral_speed_m_s,
+            yaw_rad: e.yaw_rad,
+            yaw_rate_rad_s: e.yaw_rate_rad_s,
+            wheel_speed_rad_s: s.speed_m_s / self.parameters.driveline.wheel_radius_m,
+            accel_x_m_s2: s.accel_m_s2,
+            x_m: e.x_m,
+            y_m: e.y_m,
+            articulation_rad: e.trailer.articulation_rad,
+        }
+    }
+
+    fn mean_pressure_pa(&self, s: &TruckState) -> f64 {
+        self.brake_share.iter().zip(s.brake.pressure_pa).map(|(w, p)| w * p).sum()
+    }
+
+    /// Lengths relative to the reference point.
+    #[must_use]
+    pub fn geometry(&self) -> Geometry {
+        let (l, b) = (&self.parameters.lateral, &self.parameters.body);
+        let wheelbase_m = l.tractor.steer_axle_ahead_of_cg_m + l.tractor.drive_group_behind_cg_m;
+        Geometry {
+            front_m: wheelbase_m + b.front_overhang_m,
+            wheelbase_m,
+            cg_ahead_m: l.tractor.drive_group_behind_cg_m,
+            hitch_ahead_m: l.tractor.drive_group_behind_cg_m - l.tractor.hitch_behind_cg_m,
+            hitch_to_trailer_axle_m: l.trailer.axle_group_behind_hitch_m,
+            trailer_front_m: b.trailer_front_m,
+            trailer_rear_m: b.trailer_rear_m,
+            tractor_rear_m: b.tractor_rear_overhang_m,
+            width_m: b.width_m,
+        }
+    }
+
+    /// What a planner may know about this truck at its present load, in standard air.
+    ///
+    /// # Errors
+    /// [`DynamicsError::OutOfBounds`] if a table cannot be built.
+    pub fn vehicle_limits(&self) -> Result<VehicleLimits, DynamicsError> {
+        let (p, e, d) = (&self.parameters, &self.parameters.engine, &self.parameters.driveline);
+        let gears = d.gear_ratios.len() as u8;
+        let speeds: Vec<f64> = (0..=30)
+            .map(|i| {
+                (e.idle_speed_rpm + f64::from(i) * (e.max_speed_rpm - e.idle_speed_rpm) / 30.0)
+                    / RPM_PER_RAD_S
+            })
+            .collect();
+        let tabulate = |name: &str, f: &dyn Fn(f64) -> f64| {
+            Curve::new(name, speeds.clone(), speeds.iter().map(|&n| f(n)).collect()).map_err(|e| {
+                DynamicsError::OutOfBounds { name: p.name.clone(), violations: vec![e.to_string()] }
+            })
+        };
+        let idle = self.engine.idle_rad_s;
+        let holding = self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, 350.0);
+        let m = self.lateral.yaw_sideslip();
+        let c = &m.stiffness_n_rad;
+        Ok(VehicleLimits {
+            geometry: self.geometry(),
+            powertrain: PowertrainLimits {
+                gear_ratios: d.gear_ratios.clone(),
+                gear_efficiency_frac: vec![d.efficiency_frac(); d.gear_ratios.len()],
+                rotating_mass_kg: (1..=gears)
+                    .map(|g| d.rotating_mass_kg(e.inertia_kg_m2, g))
+                    .collect(),
+                rotating_mass_neutral_kg: d.rotating_mass_kg(e.inertia_kg_m2, 0),
+                final_drive_ratio: d.final_drive_ratio,
+                wheel_radius_m: d.wheel_radius_m,
+                full_load_nm: self.engine.full_load_nm.clone(),
+                friction_nm: tabulate("friction", &|n| self.engine.friction_nm(n))?,
+                engine_brake_nm: tabulate("engine brake", &|n| self.engine.engine_brake_nm(n))?,
+                auxiliary_power_w: e.auxiliary_power_w,
+                idle_speed_rad_s: idle,
+                max_speed_rad_s: self.engine.max_rad_s,
+                fuel: self.engine.fuel_model(),
+                idle_fuel_g_s: self.engine.fuel_rate_g_s(idle, holding),
+                shift_duration_s: p.shift.duration_scale_coeff
+                    * (p.shift.ramp_down_s + p.shift.open_s + p.shift.ramp_up_s),
+                pedal_map_nm: self.engine.pedal_map_nm.clone(),
+                fuel_density_kg_m3: e.fuel.density_kg_m3,
+            },
+            road_load: RoadLoad {
+                mass_kg: self.mass_kg,
+                cd_a_m2: p.resistance.drag_area_m2,
+                air_density_kg_m3: air_density_kg_m3(101_325.0, 288.15),
+                rolling_coeff: p.resistance.rolling_coeff,
+            },
+            brakes: BrakeLimits {
+                max_decel_m_s2: (p.brake.gain_n_pa * p.brake.max_pressure_pa / self.mass_kg)
+                    .min(0.65 * GRAVITY_M_S2),
+                dead_time_s: p.brake.dead_time_s,
+                build_up_s: p.brake.lag_s + p.brake.max_pressure_pa / p.brake.fill_rate_pa_s * 0.5,
+            },
+            lateral: LateralLimits {
+                steering_ratio: p.lateral.steering.ratio,
+                steering_lag_s: p.lateral.steering.lag_s,
+                tractor_mass_kg: m.tractor_mass_kg,
+                tractor_inertia_kg_m2: m.tractor_inertia_kg_m2,
+                trailer_mass_kg: m.trailer_mass_kg,
+                trailer_inertia_kg_m2: m.trailer_inertia_kg_m2,
+                trailer_cg_behind_hitch_m: m.trailer_cg_behind_hitch_m,
+                drive_half_spread_m: p.lateral.tractor.drive_half_spread_m,
+                trailer_half_spread_m: p.lateral.trailer.axle_half_spread_m,
+                steer_stiffness_n_rad: c[0],
+                drive_stiffness_n_rad: c[1] + c[2],
+                trailer_stiffness_n_rad: c[3] + c[4] + c[5],
+                rollover_accel_m_s2: self.lateral.load_transfer().rollover_accel_m_s2(),
+                max_road_wheel_rad: p.lateral.steering.max_wheel_rad / p.lateral.steering.ratio,
+            },
+        })
+    }
+}

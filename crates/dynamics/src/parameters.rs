@@ -1,0 +1,281 @@
+//! Truck files: everything that says which truck this is.
+//!
+//! A truck file is TOML with one block per effect; unknown keys are refused, every numeric key
+//! ends in its unit, every block names its source. An overlay names a base and parameters to
+//! replace by dotted path, with the uncertainty and origin of each: that is what diagnosis writes.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::DynamicsError;
+use crate::bounds::Bounds;
+use crate::effects::brake::BrakeParameters;
+use crate::effects::driveline::DrivelineParameters;
+use crate::effects::engine::EngineParameters;
+use crate::effects::resistance::ResistanceParameters;
+use crate::effects::shift::ShiftParameters;
+use crate::lateral::LateralParameters;
+
+const BUILTIN: [(&str, &str); 2] = [
+    ("sinotruk", include_str!("../trucks/sinotruk.toml")),
+    ("reference", include_str!("../trucks/reference.toml")),
+];
+
+/// A truck file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruckParameters {
+    /// Version of the format; 1.
+    pub schema: u32,
+    /// Name.
+    pub name: String,
+    /// Where the masses and lengths come from.
+    pub source: String,
+    /// Outline of the bodies.
+    pub body: BodyParameters,
+    /// Engine.
+    pub engine: EngineParameters,
+    /// Clutch, gearbox, axle, wheels, retarder.
+    pub driveline: DrivelineParameters,
+    /// Shift schedule and interruption.
+    pub shift: ShiftParameters,
+    /// Service brakes.
+    pub brake: BrakeParameters,
+    /// Rolling and air resistance.
+    pub resistance: ResistanceParameters,
+    /// Masses, lengths, tyres, steering.
+    pub lateral: LateralParameters,
+    /// Faults of the instruments.
+    #[serde(default)]
+    pub instruments: InstrumentParameters,
+}
+
+/// Outline of the bodies, for gaps, lanes and pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BodyParameters {
+    /// Front bumper ahead of the steer axle, m.
+    pub front_overhang_m: f64,
+    /// Tractor frame behind the drive-axle group, m.
+    pub tractor_rear_overhang_m: f64,
+    /// Trailer front ahead of the hitch, m.
+    pub trailer_front_m: f64,
+    /// Trailer rear behind the hitch, m.
+    pub trailer_rear_m: f64,
+    /// Width, m.
+    pub width_m: f64,
+}
+
+/// What the instruments do to the signals; neutral by default.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct InstrumentParameters {
+    /// Wheel-based speed over true speed.
+    pub speed_scale_coeff: f64,
+    /// Bias of the yaw rate sensor, rad/s.
+    pub yaw_rate_bias_rad_s: f64,
+    /// Bias of the map's grade, rise over run.
+    pub grade_bias_frac: f64,
+    /// How far the map lies ahead of the truth, m.
+    pub map_shift_m: f64,
+}
+
+impl Default for InstrumentParameters {
+    fn default() -> Self {
+        Self {
+            speed_scale_coeff: 1.0,
+            yaw_rate_bias_rad_s: 0.0,
+            grade_bias_frac: 0.0,
+            map_shift_m: 0.0,
+        }
+    }
+}
+
+/// An overlay on a truck file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Overlay {
+    /// Version of the format; 1.
+    pub schema: u32,
+    /// Built-in name or path of the truck that this changes.
+    pub base: String,
+    /// Name of the result.
+    pub name: String,
+    /// What is replaced, by dotted path, e.g. `resistance.rolling_coeff`.
+    pub set: BTreeMap<String, OverlayValue>,
+}
+
+/// One replaced parameter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OverlayValue {
+    /// The new value, in the unit of the path's last key.
+    pub value: f64,
+    /// Standard deviation of the value, same unit.
+    #[serde(default)]
+    pub sigma: Option<f64>,
+    /// Lowest and highest value considered.
+    #[serde(default)]
+    pub bounds: Option<[f64; 2]>,
+    /// Where the value comes from.
+    pub source: String,
+}
+
+impl TruckParameters {
+    /// Names of the built-in trucks.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILTIN.iter().map(|(name, _)| *name)
+    }
+
+    /// A built-in truck by name, or a truck or overlay file by path.
+    ///
+    /// # Errors
+    /// [`DynamicsError`] names the file, key and value.
+    pub fn load(name_or_path: &str) -> Result<Self, DynamicsError> {
+        Self::load_nested(name_or_path, 0)
+    }
+
+    fn load_nested(name_or_path: &str, depth: u32) -> Result<Self, DynamicsError> {
+        if let Some((name, text)) = BUILTIN.iter().find(|(n, _)| *n == name_or_path) {
+            return Self::from_toml_str(name, text);
+        }
+        let path = Path::new(name_or_path);
+        if !name_or_path.ends_with(".toml") {
+            return Err(DynamicsError::UnknownTruck {
+                name: name_or_path.into(),
+                known: Self::names().collect::<Vec<_>>().join(", "),
+            });
+        }
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| DynamicsError::Io { path: name_or_path.into(), why: e.to_string() })?;
+        let table: toml::Table =
+            toml::from_str(&text).map_err(|e| parse(name_or_path, &text, &e))?;
+        if !table.contains_key("base") {
+            return Self::from_toml_str(name_or_path, &text);
+        }
+        let overlay: Overlay = toml::from_str(&text).map_err(|e| parse(name_or_path, &text, &e))?;
+        if depth > 8 {
+            return Err(DynamicsError::Parse {
+                name: name_or_path.into(),
+                why: "overlays nest more than 8 deep".into(),
+            });
+        }
+        let beside = path.parent().map(|p| p.join(&overlay.base));
+        let base = match beside {
+            Some(file) if file.is_file() => file.display().to_string(),
+            _ => overlay.base.clone(),
+        };
+        Self::load_nested(&base, depth + 1)?.with_overlay(&overlay)
+    }
+
+    /// Parses and checks a truck file. `name` appears in messages.
+    ///
+    /// # Errors
+    /// [`DynamicsError::Parse`] with line and key, or [`DynamicsError::OutOfBounds`] with every
+    /// violated bound.
+    pub fn from_toml_str(name: &str, text: &str) -> Result<Self, DynamicsError> {
+        let truck: Self = toml::from_str(text).map_err(|e| parse(name, text, &e))?;
+        truck.checked(name)
+    }
+
+    /// This truck with an overlay's values.
+    ///
+    /// # Errors
+    /// [`DynamicsError::UnknownParameter`] or [`DynamicsError::OutOfBounds`].
+    pub fn with_overlay(&self, overlay: &Overlay) -> Result<Self, DynamicsError> {
+        let mut truck = self.clone();
+        for (path, new) in &overlay.set {
+            truck = truck.with_parameter(path, new.value).map_err(|e| match e {
+                DynamicsError::UnknownParameter { path, .. } => {
+                    DynamicsError::UnknownParameter { name: overlay.name.clone(), path }
+                }
+                other => other,
+            })?;
+        }
+        truck.name.clone_from(&overlay.name);
+        truck.checked(&overlay.name)
+    }
+
+    /// This truck with one number replaced, by dotted path; `[i]` picks from a list.
+    ///
+    /// # Errors
+    /// [`DynamicsError::UnknownParameter`] if the path names no number.
+    pub fn with_parameter(&self, path: &str, value: f64) -> Result<Self, DynamicsError> {
+        let unknown =
+            || DynamicsError::UnknownParameter { name: self.name.clone(), path: path.into() };
+        let mut root = toml::Value::try_from(self).map_err(|_| unknown())?;
+        *number_at(&mut root, path).ok_or_else(unknown)? = toml::Value::Float(value);
+        root.try_into().map_err(|_| unknown())
+    }
+
+    /// One number by dotted path.
+    #[must_use]
+    pub fn parameter(&self, path: &str) -> Option<f64> {
+        let mut root = toml::Value::try_from(self).ok()?;
+        match number_at(&mut root, path)? {
+            toml::Value::Float(v) => Some(*v),
+            toml::Value::Integer(v) => Some(*v as f64),
+            _ => None,
+        }
+    }
+
+    fn checked(self, name: &str) -> Result<Self, DynamicsError> {
+        let mut violations = Vec::new();
+        if self.schema != 1 {
+            violations.push(format!("schema = {}, this program reads 1", self.schema));
+        }
+        let mut b = Bounds::of("body");
+        b.within("front_overhang_m", self.body.front_overhang_m, 0.0, 5.0);
+        b.within("tractor_rear_overhang_m", self.body.tractor_rear_overhang_m, 0.0, 5.0);
+        b.within("trailer_front_m", self.body.trailer_front_m, 0.0, 5.0);
+        b.within("trailer_rear_m", self.body.trailer_rear_m, 1.0, 25.0);
+        b.within("width_m", self.body.width_m, 1.5, 4.0);
+        violations.extend(b.violations);
+        let mut b = Bounds::of("instruments");
+        b.within("speed_scale_coeff", self.instruments.speed_scale_coeff, 0.5, 2.0);
+        b.within("yaw_rate_bias_rad_s", self.instruments.yaw_rate_bias_rad_s, -0.2, 0.2);
+        b.within("grade_bias_frac", self.instruments.grade_bias_frac, -0.1, 0.1);
+        b.within("map_shift_m", self.instruments.map_shift_m, -500.0, 500.0);
+        violations.extend(b.violations);
+        violations.extend(self.engine.violations());
+        violations.extend(self.driveline.violations());
+        violations.extend(self.shift.violations(self.driveline.gear_ratios.len()));
+        violations.extend(self.brake.violations());
+        violations.extend(self.resistance.violations());
+        violations.extend(self.lateral.violations().into_iter().map(|v| format!("lateral.{v}")));
+        if violations.is_empty() {
+            Ok(self)
+        } else {
+            Err(DynamicsError::OutOfBounds { name: name.into(), violations })
+        }
+    }
+}
+
+/// The number at a dotted path of a TOML value.
+fn number_at<'a>(root: &'a mut toml::Value, path: &str) -> Option<&'a mut toml::Value> {
+    let mut at = root;
+    for key in path.split('.') {
+        let (name, index) = match key.split_once('[') {
+            Some((name, rest)) => (name, Some(rest.strip_suffix(']')?.parse::<usize>().ok()?)),
+            None => (key, None),
+        };
+        at = at.as_table_mut()?.get_mut(name)?;
+        if let Some(i) = index {
+            at = at.as_array_mut()?.get_mut(i)?;
+        }
+    }
+    (at.is_float() || at.is_integer()).then_some(at)
+}
+
+fn parse(name: &str, text: &str, e: &toml::de::Error) -> DynamicsError {
+    let place = e.span().map_or(String::new(), |span| {
+        let end = span.start.min(text.len());
+        format!("line {}: ", text[..end].matches('\n').count() + 1)
+    });
+    DynamicsError::Parse {
+        name: name.into(),
+        why: format!("{place}{}", e.message().replace('\n', " ")),
+    }
+}
