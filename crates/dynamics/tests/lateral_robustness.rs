@@ -2,7 +2,7 @@
 
 mod multibody;
 
-use dynamics::lateral::{LateralInputs, LateralModel, LateralState, TyreLaw};
+use dynamics::lateral::{LateralInputs, LateralModel, LateralParameters, LateralState, TyreLaw};
 use multibody::linear::model;
 use multibody::trucks::{empty_19t, loaded_55t};
 use proptest::prelude::*;
@@ -163,6 +163,21 @@ fn every_bad_parameter_is_named_with_its_value() {
     p.payload.mass_kg = 40_000.0;
     p.payload.cg_behind_hitch_m = 30.0;
     assert!(LateralModel::new(&p).unwrap_err().to_string().contains("lifts off"));
+}
+
+#[test]
+fn the_documented_parameter_file_is_read_and_a_wrong_key_is_named() {
+    let doc = include_str!("../../../docs/lateral.md");
+    let start = doc.find("```toml\n").unwrap() + 8;
+    let text = &doc[start..start + doc[start..].find("```").unwrap()];
+    let p: LateralParameters = toml::from_str(text).unwrap();
+    let m = model(&p);
+    assert!((p.total_mass_kg() - 55_000.0).abs() < 1e-9);
+    assert_eq!(p.tyres.law, TyreLaw::Saturating { friction_coeff: 0.8 });
+    assert!((3.0..4.5).contains(&m.limits().rollover_accel_m_s2), "0.31 to 0.46 g when loaded");
+    let wrong = text.replace("lag_s", "lag_ms");
+    let error = toml::from_str::<LateralParameters>(&wrong).unwrap_err().to_string();
+    assert!(error.contains("lag_ms"), "{error}");
 }
 
 proptest! {

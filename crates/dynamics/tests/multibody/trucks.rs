@@ -49,9 +49,9 @@ pub(crate) fn empty_19t() -> LateralParameters {
         load_transfer: LoadTransferParameters {
             tractor_cg_height_m: 1.05,
             trailer_cg_height_m: 1.25,
-            payload_cg_height_m: 1.95,
+            payload_cg_height_m: 2.1,
             track_m: [2.04, 1.86, 1.86],
-            roll_factor_coeff: 1.15,
+            roll_factor_coeff: 1.25,
         },
         max_articulation_rad: 1.4,
     }
