@@ -16,7 +16,7 @@
 
 use crate::PlannerError;
 use crate::error::config_in;
-use crate::rss::{RearResponse, brake_on_grade_m_s2, safe_gap_m, safe_speed_m_s};
+use crate::rss::{RearResponse, SafeGap};
 use serde::{Deserialize, Serialize};
 
 /// Car-following parameters.
@@ -86,6 +86,8 @@ pub struct Lead {
     pub accel_m_s2: f64,
     /// Its hardest deceleration, m/s².
     pub brake_max_m_s2: f64,
+    /// The ego is leaving its lane: the safe gap is kept, the comfortable one no longer.
+    pub being_left: bool,
 }
 
 /// Car following's request.
@@ -109,8 +111,9 @@ pub fn follow(
     lead: &Lead,
 ) -> Following {
     let (v, v_f, gap) = (speed_m_s.max(0.0), lead.speed_m_s.max(0.0), lead.gap_m);
-    let hardest = brake_on_grade_m_s2(ego.brake_min_m_s2, grade_rad);
-    let d_safe = safe_gap_m(v, v_f, ego, lead.brake_max_m_s2, grade_rad);
+    let safe = SafeGap::new(ego, lead.brake_max_m_s2, grade_rad);
+    let hardest = safe.rear_brake_m_s2();
+    let d_safe = safe.gap_m(v, v_f);
 
     let (a, b) = (config.accel_m_s2, config.comfort_decel_m_s2);
     let approach = v * (v - v_f) / (2.0 * libm::sqrt(a * b));
@@ -119,8 +122,9 @@ pub fn follow(
     let ratio = wanted / gap.max(0.1);
     let idm = a * (1.0 - ratio * ratio);
 
-    let room = gap - 0.5 * config.safe_gap_margin_m;
-    let v_s = safe_speed_m_s(room, v_f, ego, lead.brake_max_m_s2, grade_rad);
+    let margin = if lead.being_left { 0.0 } else { 0.5 * config.safe_gap_margin_m };
+    let room = gap - margin;
+    let v_s = safe.rear_speed_m_s(room, v_f);
     let feed_forward = (v - v_f).max(0.0) / (ego.reaction_s + v / hardest);
     let restore = if v > v_s {
         let closing_is_safe = config.restore_1_s * (v - v_s);
@@ -133,8 +137,9 @@ pub fn follow(
     let plausible = (brakes_now + config.emergency_extra_m_s2).min(lead.brake_max_m_s2);
     // The decision is made now and repeated: only the actuator's delay still counts.
     let acting = RearResponse { accel_max_m_s2: 0.0, ..*ego };
-    let emergency = gap < safe_gap_m(v, v_f, &acting, plausible, grade_rad) && v > 0.1;
-    let accel = if emergency { -hardest } else { idm.max(-2.0 * b).min(restore) };
+    let emergency = v > 0.1 && gap < SafeGap::new(&acting, plausible, grade_rad).gap_m(v, v_f);
+    let comfort = if lead.being_left { a } else { idm.max(-2.0 * b) };
+    let accel = if emergency { -hardest } else { comfort.min(restore) };
     Following {
         accel_m_s2: accel.clamp(-hardest.max(b), a),
         below_safe_gap: gap < d_safe,
@@ -150,7 +155,7 @@ mod tests {
         RearResponse { reaction_s: 1.0, accel_max_m_s2: 0.3, brake_min_m_s2: 3.5 };
 
     fn lead(gap_m: f64, speed_m_s: f64) -> Lead {
-        Lead { id: 1, gap_m, speed_m_s, accel_m_s2: 0.0, brake_max_m_s2: 8.0 }
+        Lead { id: 1, gap_m, speed_m_s, accel_m_s2: 0.0, brake_max_m_s2: 8.0, being_left: false }
     }
 
     #[test]

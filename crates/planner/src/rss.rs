@@ -131,47 +131,59 @@ pub fn brake_on_grade_m_s2(brake_m_s2: f64, grade_rad: f64) -> f64 {
     (brake_m_s2 + GRAVITY_M_S2 * libm::sin(grade_rad)).max(0.3)
 }
 
-/// Safe gap in m between a rear and a front vehicle, both speeds in m/s, grade in rad (uphill
-/// positive, acting on both). `front_brake_m_s2` is the front's hardest deceleration on the level.
-#[must_use]
-pub fn safe_gap_m(
-    rear_speed_m_s: f64,
-    front_speed_m_s: f64,
-    rear: &RearResponse,
+/// Safe gap between one rear and one front vehicle on one grade.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SafeGap {
+    reaction_s: f64,
+    accel_m_s2: f64,
+    rear_brake_m_s2: f64,
     front_brake_m_s2: f64,
-    grade_rad: f64,
-) -> f64 {
-    let (v_r, v_f) = (rear_speed_m_s.max(0.0), front_speed_m_s.max(0.0));
-    let (rho, a) = (rear.reaction_s, rear.accel_max_m_s2);
-    let b_r = brake_on_grade_m_s2(rear.brake_min_m_s2, grade_rad);
-    let b_f = brake_on_grade_m_s2(front_brake_m_s2, grade_rad);
-    let v_after = v_r + rho * a;
-    let d =
-        v_r * rho + 0.5 * a * rho * rho + v_after * v_after / (2.0 * b_r) - v_f * v_f / (2.0 * b_f);
-    d.max(0.0)
 }
 
-/// The largest rear speed, m/s, for which `gap_m` is safe: [`safe_gap_m`] solved for its first
-/// argument; zero when no speed is safe.
-#[must_use]
-pub fn safe_speed_m_s(
-    gap_m: f64,
-    front_speed_m_s: f64,
-    rear: &RearResponse,
-    front_brake_m_s2: f64,
-    grade_rad: f64,
-) -> f64 {
-    let v_f = front_speed_m_s.max(0.0);
-    let (rho, a) = (rear.reaction_s, rear.accel_max_m_s2);
-    let b_r = brake_on_grade_m_s2(rear.brake_min_m_s2, grade_rad);
-    let b_f = brake_on_grade_m_s2(front_brake_m_s2, grade_rad);
-    // w = v_r + rho a solves w²/(2 b_r) + rho w - (gap + a rho²/2 + v_f²/(2 b_f)) = 0
-    let room = gap_m + 0.5 * a * rho * rho + v_f * v_f / (2.0 * b_f);
-    if room <= 0.0 {
-        return 0.0;
+impl SafeGap {
+    /// For a rear vehicle that responds so, behind a front vehicle whose hardest deceleration on
+    /// the level is `front_brake_m_s2`; the grade (rad, uphill positive) acts on both.
+    #[must_use]
+    pub fn new(rear: &RearResponse, front_brake_m_s2: f64, grade_rad: f64) -> Self {
+        Self {
+            reaction_s: rear.reaction_s,
+            accel_m_s2: rear.accel_max_m_s2,
+            rear_brake_m_s2: brake_on_grade_m_s2(rear.brake_min_m_s2, grade_rad),
+            front_brake_m_s2: brake_on_grade_m_s2(front_brake_m_s2, grade_rad),
+        }
     }
-    let w = b_r * (libm::sqrt(rho * rho + 2.0 * room / b_r) - rho);
-    (w - rho * a).max(0.0)
+
+    /// Deceleration of the rear vehicle on this grade, m/s².
+    #[must_use]
+    pub fn rear_brake_m_s2(&self) -> f64 {
+        self.rear_brake_m_s2
+    }
+
+    /// The safe gap, m, for these speeds in m/s.
+    #[must_use]
+    pub fn gap_m(&self, rear_speed_m_s: f64, front_speed_m_s: f64) -> f64 {
+        let (v_r, v_f) = (rear_speed_m_s.max(0.0), front_speed_m_s.max(0.0));
+        let (rho, a) = (self.reaction_s, self.accel_m_s2);
+        let w = v_r + rho * a;
+        let d = v_r * rho + 0.5 * a * rho * rho + w * w / (2.0 * self.rear_brake_m_s2)
+            - v_f * v_f / (2.0 * self.front_brake_m_s2);
+        d.max(0.0)
+    }
+
+    /// The largest rear speed, m/s, for which `gap_m` is safe: [`Self::gap_m`] solved for its first
+    /// argument; zero when no speed is safe.
+    #[must_use]
+    pub fn rear_speed_m_s(&self, gap_m: f64, front_speed_m_s: f64) -> f64 {
+        let v_f = front_speed_m_s.max(0.0);
+        let (rho, a, b_r) = (self.reaction_s, self.accel_m_s2, self.rear_brake_m_s2);
+        // w = v_r + rho a solves w²/(2 b_r) + rho w = gap + a rho²/2 + v_f²/(2 b_f)
+        let room = gap_m + 0.5 * a * rho * rho + v_f * v_f / (2.0 * self.front_brake_m_s2);
+        if room <= 0.0 {
+            return 0.0;
+        }
+        let w = b_r * (libm::sqrt(rho * rho + 2.0 * room / b_r) - rho);
+        (w - rho * a).max(0.0)
+    }
 }
 
 #[cfg(test)]
@@ -191,14 +203,14 @@ mod tests {
             (20.0, 20.0, 54.0),
             (25.0, 20.0, 92.0),
         ] {
-            let d = safe_gap_m(v_r, v_f, &loaded(), 8.0, 0.0);
+            let d = SafeGap::new(&loaded(), 8.0, 0.0).gap_m(v_r, v_f);
             assert!((d - gap).abs() < 1.0, "{v_r}/{v_f}: {d}");
         }
     }
 
     #[test]
     fn a_descent_and_a_faster_rear_vehicle_need_more_room_and_a_faster_front_vehicle_less() {
-        let d = |v_r, v_f, grade| safe_gap_m(v_r, v_f, &loaded(), 8.0, grade);
+        let d = |v_r, v_f, grade| SafeGap::new(&loaded(), 8.0, grade).gap_m(v_r, v_f);
         assert!(d(20.0, 15.0, -0.05) > d(20.0, 15.0, 0.0));
         assert!(d(21.0, 15.0, 0.0) > d(20.0, 15.0, 0.0));
         assert!(d(20.0, 16.0, 0.0) < d(20.0, 15.0, 0.0));
@@ -208,8 +220,8 @@ mod tests {
     #[test]
     fn safe_speed_is_the_inverse_of_safe_gap() {
         for (v_r, v_f, grade) in [(20.0, 15.0, -0.04), (25.0, 0.0, 0.0), (12.0, 10.0, 0.05)] {
-            let gap = safe_gap_m(v_r, v_f, &loaded(), 8.0, grade);
-            let back = safe_speed_m_s(gap, v_f, &loaded(), 8.0, grade);
+            let safe = SafeGap::new(&loaded(), 8.0, grade);
+            let back = safe.rear_speed_m_s(safe.gap_m(v_r, v_f), v_f);
             assert!((back - v_r).abs() < 1e-9, "{v_r} came back as {back}");
         }
     }

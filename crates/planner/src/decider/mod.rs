@@ -1,7 +1,17 @@
 //! Who wishes lane changes. A decider only wishes; the safety gate decides whether it is driven.
 
+mod mobil;
+mod rules;
+
+pub use mobil::{MobilConfig, mobil};
+pub use rules::rules;
+
 use crate::PlannerError;
+use crate::error::config_in;
+use crate::surroundings::{EgoExtent, ahead, behind, in_lane};
+use road::{LaneKind, Road};
 use serde::{Deserialize, Serialize};
+use tractrix_core::{EgoState, Geometry, Neighbour, Scene};
 
 /// What a decider wishes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -23,6 +33,16 @@ pub enum DeciderKind {
     /// Never wishes a change.
     #[default]
     KeepLane,
+    /// The paper's rule-based state machine; 50 m is its aggressive, 100 m its neutral, 150 m its
+    /// conservative driver.
+    Rules {
+        /// The paper's `d`, m.
+        distance_m: f64,
+    },
+    /// Minimising overall braking induced by lane changes (Kesting et al. 2007).
+    Mobil(MobilConfig),
+    /// A learned policy, given to [`crate::Stack::with_policy`].
+    Dqn,
     /// Wishes come from outside: [`crate::Stack::request_lane_change`].
     External,
 }
@@ -33,6 +53,74 @@ impl DeciderKind {
     /// # Errors
     /// [`PlannerError::Config`] names the key.
     pub fn check(&self) -> Result<(), PlannerError> {
-        Ok(())
+        match self {
+            Self::Rules { distance_m } => {
+                config_in("decider.rules.distance_m", *distance_m, 5.0, 500.0)
+            }
+            Self::Mobil(config) => config.check(),
+            Self::KeepLane | Self::Dqn | Self::External => Ok(()),
+        }
+    }
+}
+
+/// What a decider looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// The truck.
+    pub ego: &'a EgoState,
+    /// Its extent.
+    pub extent: EgoExtent,
+    /// The others.
+    pub scene: &'a Scene,
+    /// The road.
+    pub road: &'a Road,
+    /// The lane that the truck keeps.
+    pub lane: u16,
+    /// Reference speed at the truck, m/s.
+    pub reference_speed_m_s: f64,
+}
+
+impl<'a> View<'a> {
+    /// A view from the truck.
+    #[must_use]
+    pub fn new(
+        ego: &'a EgoState,
+        geometry: &Geometry,
+        scene: &'a Scene,
+        road: &'a Road,
+        lane: u16,
+        reference_speed_m_s: f64,
+    ) -> Self {
+        let extent = EgoExtent::new(ego, geometry);
+        Self { ego, extent, scene, road, lane, reference_speed_m_s }
+    }
+
+    /// The through lane on a side, if there is one here.
+    #[must_use]
+    pub fn beside(&self, choice: LaneChoice) -> Option<u16> {
+        let id = match choice {
+            LaneChoice::Left => self.road.left_of(self.lane, self.ego.s_m),
+            LaneChoice::Right => self.road.right_of(self.lane, self.ego.s_m),
+            LaneChoice::Keep => None,
+        }?;
+        let through = self.road.lanes().get(usize::from(id))?.kind == LaneKind::Driving;
+        through.then_some(id)
+    }
+
+    /// The nearest vehicle ahead in a lane and the gap to it, m.
+    #[must_use]
+    pub fn ahead(&self, lane: u16) -> Option<(&'a Neighbour, f64)> {
+        let width = self.extent.width_m;
+        let n = ahead(self.scene, &self.extent, |n| in_lane(self.road, lane, n, width))?;
+        Some((n, n.rear_s_m - self.extent.front_s_m))
+    }
+
+    /// The nearest vehicle behind in a lane and the gap from its front to the trailer's rear, m;
+    /// negative alongside.
+    #[must_use]
+    pub fn behind(&self, lane: u16) -> Option<(&'a Neighbour, f64)> {
+        let width = self.extent.width_m;
+        let n = behind(self.scene, &self.extent, |n| in_lane(self.road, lane, n, width))?;
+        Some((n, self.extent.rear_s_m - n.front_s_m))
     }
 }

@@ -1,6 +1,6 @@
 //! The reference truck's data sheet for this crate's unit tests.
 
-#![allow(dead_code, unreachable_pub)]
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 use std::vec;
 use std::vec::Vec;
 use tractrix_core::{

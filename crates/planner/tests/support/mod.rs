@@ -3,7 +3,7 @@
 //! Longitudinal: torque lag, twelve gears by engine speed with an open phase, retarder, air brakes
 //! with dead time and build-up. Lateral: tractor and trailer as two rigid bodies with linear tyres
 //! joined at the hitch, written as force sums (not the planner's matrices), integrated at 1 ms.
-#![allow(dead_code, unreachable_pub)]
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 
 pub mod data_sheet;
 
