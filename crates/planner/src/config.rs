@@ -5,6 +5,7 @@ use crate::decider::DeciderKind;
 use crate::error::config_in;
 use crate::following::FollowingConfig;
 use crate::guard::GuardConfig;
+use crate::lane_change::LaneChangeConfig;
 use crate::lateral::LateralConfig;
 use crate::longitudinal::LongitudinalConfig;
 use crate::rss::RssConfig;
@@ -92,6 +93,8 @@ pub struct StackConfig {
     pub rss: RssConfig,
     /// Car following.
     pub following: FollowingConfig,
+    /// Lane changes.
+    pub lane_change: LaneChangeConfig,
     /// Steering.
     pub lateral: LateralConfig,
     /// Pedal, retarder and brakes.
@@ -112,6 +115,7 @@ impl Default for StackConfig {
             rates: RatesConfig::default(),
             rss: RssConfig::default(),
             following: FollowingConfig::default(),
+            lane_change: LaneChangeConfig::default(),
             lateral: LateralConfig::default(),
             longitudinal: LongitudinalConfig::default(),
             guard: GuardConfig::default(),
@@ -137,8 +141,11 @@ impl StackConfig {
         ] {
             config_in(field, f64::from(ticks), 1.0, longest_s / r.tick_s)?;
         }
+        let remainder = f64::from(r.decision_ticks % r.path_ticks);
+        config_in("rates.decision_ticks modulo path_ticks", remainder, 0.0, 0.0)?;
         self.rss.check()?;
         self.following.check()?;
+        self.lane_change.check()?;
         self.lateral.check()?;
         self.longitudinal.check()?;
         self.guard.check()?;

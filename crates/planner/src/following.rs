@@ -88,6 +88,8 @@ pub struct Lead {
     pub brake_max_m_s2: f64,
     /// The ego is leaving its lane: the safe gap is kept, the comfortable one no longer.
     pub being_left: bool,
+    /// Its body is in the ego's path, or about to be; otherwise it has only said that it will come.
+    pub in_path: bool,
 }
 
 /// Car following's request.
@@ -126,7 +128,9 @@ pub fn follow(
     let room = gap - margin;
     let v_s = safe.rear_speed_m_s(room, v_f);
     let feed_forward = (v - v_f).max(0.0) / (ego.reaction_s + v / hardest);
-    let restore = if v > v_s {
+    let restore = if v > v_s && !lead.in_path {
+        -config.restore_decel_m_s2
+    } else if v > v_s {
         let closing_is_safe = config.restore_1_s * (v - v_s);
         -feed_forward - closing_is_safe.min(config.restore_decel_m_s2)
     } else {
@@ -137,7 +141,8 @@ pub fn follow(
     let plausible = (brakes_now + config.emergency_extra_m_s2).min(lead.brake_max_m_s2);
     // The decision is made now and repeated: only the actuator's delay still counts.
     let acting = RearResponse { accel_max_m_s2: 0.0, ..*ego };
-    let emergency = v > 0.1 && gap < SafeGap::new(&acting, plausible, grade_rad).gap_m(v, v_f);
+    let emergency =
+        v > 0.1 && lead.in_path && gap < SafeGap::new(&acting, plausible, grade_rad).gap_m(v, v_f);
     let comfort = if lead.being_left { a } else { idm.max(-2.0 * b) };
     let accel = if emergency { -hardest } else { comfort.min(restore) };
     Following {
@@ -155,7 +160,15 @@ mod tests {
         RearResponse { reaction_s: 1.0, accel_max_m_s2: 0.3, brake_min_m_s2: 3.5 };
 
     fn lead(gap_m: f64, speed_m_s: f64) -> Lead {
-        Lead { id: 1, gap_m, speed_m_s, accel_m_s2: 0.0, brake_max_m_s2: 8.0, being_left: false }
+        Lead {
+            id: 1,
+            gap_m,
+            speed_m_s,
+            accel_m_s2: 0.0,
+            brake_max_m_s2: 8.0,
+            being_left: false,
+            in_path: true,
+        }
     }
 
     #[test]

@@ -115,7 +115,7 @@ impl ManeuverPlanner {
         if choice == LaneChoice::Keep {
             return Ok(());
         }
-        if self.phase != Phase::Keep || at.now < self.quiet_until || self.path.offset.is_some() {
+        if self.phase != Phase::Keep || at.now < self.quiet_until {
             return Err(LaneChangeRefusal::Busy);
         }
         let own = self.path.lane;
@@ -134,8 +134,7 @@ impl ManeuverPlanner {
         let done = self.path.offset.is_none_or(|q| at.ego.s_m >= q.end_s_m());
         if done {
             if self.phase != Phase::Keep {
-                self.quiet_until =
-                    at.now.plus_nanos((self.config.cooldown_s * 1e9) as i64);
+                self.quiet_until = at.now.plus_nanos((self.config.cooldown_s * 1e9) as i64);
             }
             self.phase = Phase::Keep;
             self.path = LateralPath::keep(self.path.lane);
@@ -155,8 +154,7 @@ impl ManeuverPlanner {
             duration_s: (course.duration_s - time_s).max(0.5),
         };
         let gate = self.gate(at, own, target);
-        let verdict =
-            gate.check(&rest, &self.path, at.road, at.ego.s_m, &self.config.under_way());
+        let verdict = gate.check(&rest, &self.path, at.road, at.ego.s_m, &self.config.under_way());
         let reason = verdict.err()?;
         self.path = plan_abort(&self.config, &self.start(at), own);
         self.phase = Phase::Abort { target };
@@ -171,9 +169,8 @@ impl ManeuverPlanner {
         let s_m = at.ego.s_m;
         let soon_m = 0.5 * at.ego.speed_m_s;
         let room = 0.5 * (track.width_m(s_m) - at.limits.geometry.width_m);
-        let off = |s_m: f64| {
-            (self.path.at(at.road, s_m).d_m - lane_centre(at.road, lane, s_m).d_m).abs()
-        };
+        let off =
+            |s_m: f64| (self.path.at(at.road, s_m).d_m - lane_centre(at.road, lane, s_m).d_m).abs();
         off(s_m) < room && off(s_m + soon_m) < room
     }
 

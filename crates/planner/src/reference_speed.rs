@@ -5,7 +5,7 @@
 
 use alloc::vec::Vec;
 
-use road::{ProfilePoint, Road};
+use road::{LaneEnd, ProfilePoint, Road};
 use tractrix_core::{Geometry, SpeedPoint};
 
 /// Spacing of the reference, m.
@@ -14,6 +14,8 @@ pub const STEP_M: f64 = 10.0;
 pub const POINTS: usize = 51;
 /// Deceleration towards lower limits ahead, m/s².
 const APPROACH_DECEL_M_S2: f64 = 0.5;
+/// The truck stops so far before a lane's end, m.
+const STOP_BEFORE_END_M: f64 = 30.0;
 
 /// What bounds the reference speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,12 +60,18 @@ impl ReferenceSpeed {
             };
             curve.min(limit)
         };
+        let lane_end_m = road
+            .lanes()
+            .get(usize::from(lane))
+            .filter(|l| l.end != LaneEnd::Continues)
+            .map_or(f64::INFINITY, |l| l.s_end_m - geometry.front_m - STOP_BEFORE_END_M);
         self.points.clear();
         self.points.extend((0..POINTS).map(|i| {
             let s = s_m + i as f64 * STEP_M;
             let held = self.profile[i..=i + behind].iter().map(cap).fold(f64::INFINITY, f64::min);
             let wanted = planned(s).unwrap_or(bounds.set_speed_m_s);
-            SpeedPoint { s_m: s, speed_m_s: wanted.min(held), accel_m_s2: 0.0 }
+            let speed_m_s = if s < lane_end_m { wanted.min(held) } else { 0.0 };
+            SpeedPoint { s_m: s, speed_m_s, accel_m_s2: 0.0 }
         }));
         for i in (0..POINTS - 1).rev() {
             let ahead = self.points[i + 1].speed_m_s;

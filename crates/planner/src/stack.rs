@@ -2,16 +2,17 @@
 
 use alloc::vec::Vec;
 
-use crate::decider::LaneChoice;
-use crate::following::{Following, Lead, follow};
+use crate::decider::{DeciderKind, LaneChoice, View, lane_ends, leave_ending_lane, mobil, rules};
+use crate::following::{Following, follow};
 use crate::guard::{GuardInput, GuardMemory, Headway, inspect, limit};
 use crate::lateral::{LateralController, PREVIEW_POINTS, PREVIEW_STEP_S, PathError};
 use crate::lateral_model::LOWEST_SPEED_M_S;
+use crate::leads::{LeadView, leads};
 use crate::limits_check::check_limits;
 use crate::longitudinal::{LongitudinalController, SpeedTarget};
+use crate::maneuver::{ManeuverPlanner, Situation};
 use crate::path::{Lateral, LateralPath};
 use crate::reference_speed::{ReferenceSpeed, SpeedBounds};
-use crate::surroundings::{EgoExtent, ahead, in_lane};
 use crate::{PlannerError, StackConfig};
 use road::{LaneKind, Road};
 use tractrix_core::{
@@ -32,7 +33,7 @@ pub struct Stack {
     longitudinal: LongitudinalController,
     reference: ReferenceSpeed,
     guard: GuardMemory,
-    path: Option<LateralPath>,
+    maneuver: Option<ManeuverPlanner>,
     ticks: u64,
     last_tick: Option<Time>,
     /// Last trustworthy state, moved on by dead reckoning while there is no other.
@@ -55,7 +56,7 @@ impl Stack {
             longitudinal: LongitudinalController::new(config.longitudinal),
             reference: ReferenceSpeed::default(),
             guard: GuardMemory::default(),
-            path: None,
+            maneuver: None,
             ticks: 0,
             last_tick: None,
             believed: EgoState::default(),
@@ -142,7 +143,7 @@ impl Stack {
         self.plan.guard.extend_from_slice(&inspection.reasons);
         self.plan.refusal = None;
         let planned =
-            if inspection.ego_usable { self.drive(&ego, scene, road, limits) } else { None };
+            if inspection.ego_usable { self.drive(now, &ego, scene, road, limits) } else { None };
         let curvature = road.line().at(ego.s_m).curvature_1_m;
         let steady =
             self.lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);
@@ -163,7 +164,7 @@ impl Stack {
         }
         self.plan.command = guarded.command;
         if guarded.minimal_risk {
-            self.path = None;
+            self.maneuver = None;
             self.plan.maneuver = Maneuver::MinimalRisk;
             self.lateral
                 .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);
@@ -175,63 +176,130 @@ impl Stack {
     /// Decide, plan and control with trustworthy inputs; `None` if there is no lane to drive in.
     fn drive(
         &mut self,
+        now: Time,
         ego: &EgoState,
         scene: &Scene,
         road: &Road,
         limits: &VehicleLimits,
     ) -> Option<Command> {
         let rates = self.config.rates;
-        let due = |every: u32| self.ticks.is_multiple_of(u64::from(every));
-        let path = match self.path {
-            Some(path) => path,
-            None => join_from(road, start_lane(road, ego)?, ego),
+        let ticks = self.ticks;
+        let due = |every: u32| ticks.is_multiple_of(u64::from(every));
+        let mut maneuver = match self.maneuver.take() {
+            Some(maneuver) => maneuver,
+            None => ManeuverPlanner::new(
+                self.config.lane_change,
+                self.config.rss,
+                join_from(road, start_lane(road, ego)?, ego),
+            ),
         };
-        self.path = Some(path);
-        self.plan.maneuver = Maneuver::KeepLane;
-        self.plan.lane = path.lane;
-
         if due(rates.path_ticks) || self.reference.points().is_empty() {
-            let bounds = SpeedBounds {
-                set_speed_m_s: self.config.set_speed_m_s,
-                obey_speed_limits: self.config.obey_speed_limits,
-                curve_accel_m_s2: self.config.curve_accel_m_s2,
-            };
-            self.reference.update(road, path.lane, ego.s_m, &limits.geometry, &bounds, |_| None);
-            self.plan.speed.clear();
-            self.plan.speed.extend_from_slice(self.reference.points());
-            self.plan.speed_status = PlanStatus::Cruise;
-            publish_path(&mut self.plan.path, &path, road, ego);
+            self.update_reference(ego, road, maneuver.path().lane, limits);
         }
-        if !due(rates.control_ticks) {
-            return Some(*self.guard.sent());
-        }
-        let dt_s = rates.control_s();
         let grade_rad = grade(road, ego, limits);
-        let following = self.follow(ego, scene, road, limits, grade_rad);
-        let (speed_m_s, accel_m_s2) = self.reference.at(ego.s_m)?;
-        let target = SpeedTarget {
-            speed_m_s,
-            accel_m_s2,
-            traffic_accel_m_s2: following.map_or(f64::INFINITY, |(_, f)| f.accel_m_s2),
-            grade_rad,
+        let (reference_m_s, reference_accel) = self.reference.at(ego.s_m)?;
+        if due(rates.path_ticks) {
+            let at = Situation {
+                now,
+                ego,
+                scene,
+                road,
+                limits,
+                reference_speed_m_s: reference_m_s,
+                grade_rad: grade_rad.min(steepest_descent(road, ego.s_m)),
+            };
+            self.decide(&mut maneuver, &at, due(rates.decision_ticks));
+            publish_path(&mut self.plan.path, maneuver.path(), road, ego);
+        }
+        self.plan.maneuver = maneuver.maneuver();
+        self.plan.lane = maneuver.lane();
+        let command = if due(rates.control_ticks) {
+            let view = LeadView { ego, scene, road, limits, rss: &self.config.rss };
+            let following = self.follow(&view, &maneuver, grade_rad);
+            let planned = maneuver.planned_speed(now).filter(|p| p.0 < reference_m_s);
+            let (speed_m_s, accel_m_s2) = planned.unwrap_or((reference_m_s, reference_accel));
+            self.plan.following = following.map(|(id, _)| id);
+            self.plan.reference_speed_m_s = reference_m_s;
+            let target = SpeedTarget {
+                speed_m_s,
+                accel_m_s2,
+                traffic_accel_m_s2: following.map_or(f64::INFINITY, |(_, f)| f.accel_m_s2),
+                grade_rad,
+            };
+            self.control(ego, maneuver.path(), &target, road, limits)
+        } else {
+            *self.guard.sent()
         };
-        let speed = self.longitudinal.step(dt_s, ego, &target, limits);
+        self.maneuver = Some(maneuver);
+        Some(command)
+    }
 
-        let (error, wheel_rad) = self.steer(ego, &path, road, limits);
-        self.plan.following = following.map(|(id, _)| id);
-        self.plan.reference_speed_m_s = speed_m_s;
-        self.plan.target_speed_m_s = speed_m_s;
+    fn update_reference(&mut self, ego: &EgoState, road: &Road, lane: u16, limits: &VehicleLimits) {
+        let bounds = SpeedBounds {
+            set_speed_m_s: self.config.set_speed_m_s,
+            obey_speed_limits: self.config.obey_speed_limits,
+            curve_accel_m_s2: self.config.curve_accel_m_s2,
+        };
+        self.reference.update(road, lane, ego.s_m, &limits.geometry, &bounds, |_| None);
+        self.plan.speed.clear();
+        self.plan.speed.extend_from_slice(self.reference.points());
+        self.plan.speed_status = PlanStatus::Cruise;
+    }
+
+    /// Checks the change under way and looks at what is wished.
+    fn decide(&mut self, maneuver: &mut ManeuverPlanner, at: &Situation<'_>, due: bool) {
+        self.plan.refusal = maneuver.update(at);
+        let wish = match self.config.decider {
+            DeciderKind::External => core::mem::take(&mut self.wish),
+            _ if !due || maneuver.maneuver() != Maneuver::KeepLane => LaneChoice::Keep,
+            kind => {
+                let view = View::new(
+                    at.ego,
+                    &at.limits.geometry,
+                    at.scene,
+                    at.road,
+                    maneuver.lane(),
+                    at.reference_speed_m_s,
+                );
+                match kind {
+                    _ if lane_ends(&view) => leave_ending_lane(&view),
+                    DeciderKind::Rules { distance_m } => rules(&view, distance_m),
+                    DeciderKind::Mobil(config) => mobil(&view, &config),
+                    DeciderKind::KeepLane | DeciderKind::Dqn | DeciderKind::External => {
+                        LaneChoice::Keep
+                    }
+                }
+            }
+        };
+        if let Err(refusal) = maneuver.request(wish, at) {
+            self.plan.refusal = Some(refusal);
+        }
+    }
+
+    /// Both controllers.
+    fn control(
+        &mut self,
+        ego: &EgoState,
+        path: &LateralPath,
+        target: &SpeedTarget,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> Command {
+        let dt_s = self.config.rates.control_s();
+        let speed = self.longitudinal.step(dt_s, ego, target, limits);
+        let (error, wheel_rad) = self.steer(ego, path, road, limits);
+        self.plan.target_speed_m_s = target.speed_m_s;
         self.plan.target_accel_m_s2 = speed.accel_m_s2;
         self.plan.target_d_m = ego.d_m - error.offset_m;
         self.plan.lateral_error_m = error.offset_m;
-        Some(Command {
+        Command {
             accelerator_pedal_frac: speed.accelerator_pedal_frac,
             xbr_decel_m_s2: speed.xbr_decel_m_s2,
             brake_mode: speed.brake_mode,
             steering_wheel_rad: wheel_rad * limits.lateral.steering_ratio,
             retarder_frac: speed.retarder_frac,
             gear: GearRequest::Automatic,
-        })
+        }
     }
 
     fn steer(
@@ -254,40 +322,25 @@ impl Stack {
         (error, self.lateral.step(ego, error, &curvature, limits))
     }
 
-    /// Car following behind the nearest vehicle in the lane.
+    /// The strictest request of car following, and whom it follows.
     fn follow(
         &self,
-        ego: &EgoState,
-        scene: &Scene,
-        road: &Road,
-        limits: &VehicleLimits,
+        view: &LeadView<'_>,
+        maneuver: &ManeuverPlanner,
         grade_rad: f64,
     ) -> Option<(u64, Following)> {
-        let lead = self.lead(ego, scene, road, limits)?;
-        let response = self.config.rss.ego_response(limits);
-        let f = follow(&self.config.following, &response, ego.speed_m_s, grade_rad, &lead);
-        Some((lead.id, f))
+        let response = self.config.rss.ego_response(view.limits);
+        leads(view, maneuver)
+            .into_iter()
+            .flatten()
+            .map(|lead| {
+                let v = view.ego.speed_m_s;
+                (lead.id, follow(&self.config.following, &response, v, grade_rad, &lead))
+            })
+            .min_by(|a, b| a.1.accel_m_s2.total_cmp(&b.1.accel_m_s2))
     }
 
-    fn lead(
-        &self,
-        ego: &EgoState,
-        scene: &Scene,
-        road: &Road,
-        limits: &VehicleLimits,
-    ) -> Option<Lead> {
-        let lane = self.path?.lane;
-        let extent = EgoExtent::new(ego, &limits.geometry);
-        let n = ahead(scene, &extent, |n| in_lane(road, lane, n, extent.width_m))?;
-        Some(Lead {
-            id: n.id,
-            gap_m: n.rear_s_m - extent.front_s_m,
-            speed_m_s: n.speed_m_s,
-            accel_m_s2: n.accel_m_s2,
-            brake_max_m_s2: self.config.rss.brake_max_m_s2(n.class),
-        })
-    }
-
+    /// The vehicle in the path with the least time to spare, for the guard.
     fn headway(
         &self,
         ego: &EgoState,
@@ -295,8 +348,13 @@ impl Stack {
         road: &Road,
         limits: &VehicleLimits,
     ) -> Option<Headway> {
-        let lead = self.lead(ego, scene, road, limits)?;
-        Some(Headway { gap_m: lead.gap_m, speed_m_s: lead.speed_m_s, accel_m_s2: lead.accel_m_s2 })
+        let view = LeadView { ego, scene, road, limits, rss: &self.config.rss };
+        leads(&view, self.maneuver.as_ref()?)
+            .into_iter()
+            .flatten()
+            .filter(|lead| lead.in_path)
+            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+            .map(|l| Headway { gap_m: l.gap_m, speed_m_s: l.speed_m_s, accel_m_s2: l.accel_m_s2 })
     }
 
     /// Moves the believed state along the road with the deceleration that was commanded.
@@ -337,6 +395,11 @@ fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
     let front = road.at(ego.s_m + g.front_m, 0.0).z_m;
     let rear = road.at(ego.s_m - g.rear_m(), 0.0).z_m;
     libm::atan((front - rear) / length)
+}
+
+/// The steepest descent within the stopping distance ahead, rad, not above zero.
+fn steepest_descent(road: &Road, s_m: f64) -> f64 {
+    (0..8).map(|i| libm::atan(road.line().at(s_m + 25.0 * f64::from(i)).slope)).fold(0.0, f64::min)
 }
 
 fn publish_path(

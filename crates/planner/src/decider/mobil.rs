@@ -74,8 +74,8 @@ impl Driver {
         let ratio = v / wanted_m_s.max(1.0);
         let free = 1.0 - ratio * ratio * ratio * ratio;
         let interaction = ahead.map_or(0.0, |(gap_m, ahead_m_s)| {
-            let closing = v * (v - ahead_m_s)
-                / (2.0 * libm::sqrt(self.accel_m_s2 * self.decel_m_s2));
+            let closing =
+                v * (v - ahead_m_s) / (2.0 * libm::sqrt(self.accel_m_s2 * self.decel_m_s2));
             let wanted_gap = self.standstill_m + (v * self.headway_s + closing).max(0.0);
             let r = wanted_gap / gap_m.max(0.5);
             r * r
@@ -113,8 +113,7 @@ pub fn mobil(view: &View<'_>, config: &MobilConfig) -> LaneChoice {
                 if then < -config.safe_decel_m_s2 {
                     return None;
                 }
-                let before =
-                    lead(lane).map(|(ahead_m, v_a)| (gap_m + length_m + ahead_m, v_a));
+                let before = lead(lane).map(|(ahead_m, v_a)| (gap_m + length_m + ahead_m, v_a));
                 then - follower(n, before)
             }
         };

@@ -9,7 +9,7 @@ pub use rules::rules;
 use crate::PlannerError;
 use crate::error::config_in;
 use crate::surroundings::{EgoExtent, ahead, behind, in_lane};
-use road::{LaneKind, Road};
+use road::{LaneEnd, LaneKind, Road};
 use serde::{Deserialize, Serialize};
 use tractrix_core::{EgoState, Geometry, Neighbour, Scene};
 
@@ -123,4 +123,25 @@ impl<'a> View<'a> {
         let n = behind(self.scene, &self.extent, |n| in_lane(self.road, lane, n, width))?;
         Some((n, self.extent.rear_s_m - n.front_s_m))
     }
+}
+
+/// A lane that ends within this distance must be left, whatever the decider wishes, m.
+const LEAVE_WITHIN_M: f64 = 800.0;
+
+/// Whether the truck's lane ends soon.
+#[must_use]
+pub fn lane_ends(view: &View<'_>) -> bool {
+    view.road
+        .lanes()
+        .get(usize::from(view.lane))
+        .is_some_and(|l| l.end != LaneEnd::Continues && l.s_end_m - view.ego.s_m < LEAVE_WITHIN_M)
+}
+
+/// The side on which a through lane goes on, left first.
+#[must_use]
+pub fn leave_ending_lane(view: &View<'_>) -> LaneChoice {
+    [LaneChoice::Left, LaneChoice::Right]
+        .into_iter()
+        .find(|&choice| view.beside(choice).is_some())
+        .unwrap_or(LaneChoice::Keep)
 }
