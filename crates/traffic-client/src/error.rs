@@ -38,4 +38,7 @@ pub enum TrafficError {
     /// SUMO.
     #[error(transparent)]
     Sumo(#[from] crate::sumo::SumoError),
+    /// A recording.
+    #[error(transparent)]
+    Replay(#[from] crate::replay::ReplayError),
 }

@@ -1,12 +1,13 @@
 //! Where the other vehicles come from.
 //!
 //! [`native`]: IDM car following and MOBIL lane changes on any road, deterministic to the bit.
-//! [`sumo`]: SUMO over TraCI. Every source implements [`tractrix_core::TrafficSource`].
+//! [`sumo`]: SUMO over TraCI. [`replay`]: recorded trajectories. Every source implements [`tractrix_core::TrafficSource`].
 
 mod error;
 mod hash;
 pub mod native;
 mod philox;
+pub mod replay;
 pub mod sumo;
 
 pub use error::TrafficError;
