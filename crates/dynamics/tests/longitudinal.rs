@@ -93,7 +93,7 @@ fn stopping_takes_dead_time_build_up_and_braking_distance() {
         &[
             ("brake.lag_s", 0.005),
             ("resistance.rolling_coeff", 0.0),
-            ("resistance.drag_area_m", 0.0),
+            ("resistance.drag_area_m2", 0.0),
         ],
     );
     let mut s = m.initial_state(0.0, 0.0, 0.0, 20.0);

@@ -1,1 +1,26 @@
-//! The closed loop without a server: SimTruck, World, scenarios.
+//! The closed loop without a server: a truck model on a road in traffic, driven by the planning
+//! stack through [`planner::drive_tick`], the same body that runs on a real truck.
+//!
+//! A [`Scenario`] says what is driven, a [`World`] drives it tick by tick, [`Metrics`] measures it.
+//! Time comes from the tick counter, randomness from the seed: same seed, same bits, whatever
+//! records or watches.
+//!
+//! Left out on purpose: clocks and pacing, sockets, files other than scenarios, roads and trucks.
+
+mod collision;
+mod error;
+mod memory;
+mod metrics;
+mod scenario;
+mod sim_truck;
+mod traffic;
+mod world;
+
+pub use collision::{Footprint, footprints_overlap};
+pub use error::SimError;
+pub use memory::{MemoryRecord, MemoryRecorder};
+pub use metrics::{Metrics, Summary};
+pub use scenario::{EgoStart, RunLimits, Scenario, TrafficSection, TruckSection, Weather};
+pub use sim_truck::SimTruck;
+pub use traffic::Traffic;
+pub use world::{Status, World};

@@ -1,0 +1,235 @@
+//! What is driven: a TOML file with a road, a truck, a start, a stack, traffic and weather.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use traffic_client::TrafficConfig;
+
+use crate::SimError;
+
+/// Built-in scenarios: name and text.
+const BUILTIN: [(&str, &str); 4] = [
+    ("highway", include_str!("../scenarios/highway.toml")),
+    ("highway-empty", include_str!("../scenarios/highway-empty.toml")),
+    ("test-site", include_str!("../scenarios/test-site.toml")),
+    ("flat", include_str!("../scenarios/flat.toml")),
+];
+
+/// A scenario. Unknown keys are refused.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Version of the format; 1.
+    pub schema: u32,
+    /// Name, used for the output folder.
+    pub name: String,
+    /// One sentence on what it is for.
+    #[serde(default)]
+    pub description: String,
+    /// Road: `builtin:highway`, `builtin:test-site`, `builtin:flat`, or a path to `.xodr` or `.csv`.
+    pub road: String,
+    /// The truck.
+    pub truck: TruckSection,
+    /// Where and how fast the ego starts.
+    #[serde(default)]
+    pub ego: EgoStart,
+    /// The planning stack.
+    #[serde(default)]
+    pub stack: planner::StackConfig,
+    /// The other vehicles.
+    #[serde(default)]
+    pub traffic: TrafficSection,
+    /// Wind, temperature, grip.
+    #[serde(default)]
+    pub weather: Weather,
+    /// Tick and duration.
+    #[serde(default)]
+    pub run: RunLimits,
+}
+
+/// The truck and its load.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruckSection {
+    /// Built-in name (`sinotruk`, `reference`) or path of a truck file.
+    pub file: String,
+    /// Payload on the trailer, kg.
+    pub payload_kg: f64,
+}
+
+/// Where and how fast the ego starts.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EgoStart {
+    /// Station of the reference point, m.
+    pub s_m: f64,
+    /// Lane track; none = the rightmost driving lane at the start.
+    pub lane: Option<u16>,
+    /// Speed, m/s.
+    pub speed_m_s: f64,
+}
+
+impl Default for EgoStart {
+    fn default() -> Self {
+        Self { s_m: 30.0, lane: None, speed_m_s: 20.0 }
+    }
+}
+
+/// Which traffic, and its figures.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrafficSection {
+    /// The source: `native` or `none`.
+    #[serde(default)]
+    pub source: TrafficKind,
+    /// Figures of the native engine.
+    #[serde(default)]
+    pub native: TrafficConfig,
+}
+
+/// A traffic source by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TrafficKind {
+    /// The native IDM+MOBIL engine.
+    #[default]
+    Native,
+    /// An empty road.
+    None,
+}
+
+/// Weather along the whole road.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Weather {
+    /// Wind velocity, map x, m/s (positive blows towards +x).
+    pub wind_x_m_s: f64,
+    /// Wind velocity, map y, m/s.
+    pub wind_y_m_s: f64,
+    /// Air temperature at the start of the road, K.
+    pub air_temperature_k: f64,
+    /// Air pressure at the start of the road, Pa; falls with altitude along it.
+    pub air_pressure_pa: f64,
+    /// Friction coefficient between tyre and road, dimensionless.
+    pub adhesion_coeff: f64,
+}
+
+impl Default for Weather {
+    fn default() -> Self {
+        Self {
+            wind_x_m_s: 0.0,
+            wind_y_m_s: 0.0,
+            air_temperature_k: 288.15,
+            air_pressure_pa: 101_325.0,
+            adhesion_coeff: 0.8,
+        }
+    }
+}
+
+/// Tick and end of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RunLimits {
+    /// Tick, s; the control rate.
+    pub tick_s: f64,
+    /// The run ends after this time, s, if the road has not ended before.
+    pub duration_s: f64,
+}
+
+impl Default for RunLimits {
+    fn default() -> Self {
+        Self { tick_s: 0.01, duration_s: 3600.0 }
+    }
+}
+
+impl Scenario {
+    /// Names of the built-in scenarios.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILTIN.iter().map(|(name, _)| *name)
+    }
+
+    /// The text of a built-in scenario.
+    ///
+    /// # Errors
+    /// [`SimError::UnknownScenario`] lists the names that exist.
+    pub fn builtin_text(name: &str) -> Result<&'static str, SimError> {
+        BUILTIN.iter().find(|(n, _)| *n == name).map(|(_, text)| *text).ok_or_else(|| {
+            SimError::UnknownScenario {
+                name: name.to_owned(),
+                known: Self::names().collect::<Vec<_>>().join(", "),
+            }
+        })
+    }
+
+    /// A built-in scenario.
+    ///
+    /// # Errors
+    /// As [`Self::builtin_text`].
+    pub fn builtin(name: &str) -> Result<Self, SimError> {
+        Self::from_toml_str(name, Self::builtin_text(name)?)
+    }
+
+    /// Reads a scenario file.
+    ///
+    /// # Errors
+    /// [`SimError::Io`] or, as [`Self::from_toml_str`], [`SimError::Scenario`].
+    pub fn load(path: &Path) -> Result<Self, SimError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| SimError::Io { path: path.to_owned(), source })?;
+        let mut scenario = Self::from_toml_str(&path.display().to_string(), &text)?;
+        if let Some(folder) = path.parent() {
+            scenario.resolve_paths(folder);
+        }
+        Ok(scenario)
+    }
+
+    /// Parses and checks a scenario. `name` appears in messages.
+    ///
+    /// # Errors
+    /// [`SimError::Scenario`] names the key, and all values out of range at once.
+    pub fn from_toml_str(name: &str, text: &str) -> Result<Self, SimError> {
+        let bad = |why: String| SimError::Scenario { name: name.to_owned(), why };
+        let scenario: Self = toml::from_str(text).map_err(|e| {
+            let place = e.span().map_or(String::new(), |span| {
+                let end = text.len().min(span.start);
+                format!("line {}: ", text[..end].matches('\n').count() + 1)
+            });
+            bad(format!("{place}{}", e.message().replace('\n', " ")))
+        })?;
+        let wrong = scenario.violations();
+        if wrong.is_empty() { Ok(scenario) } else { Err(bad(wrong.join("; "))) }
+    }
+
+    /// Files named by a scenario lie beside it unless their path is absolute.
+    fn resolve_paths(&mut self, folder: &Path) {
+        for file in [&mut self.road, &mut self.truck.file] {
+            if file.ends_with(".xodr") || file.ends_with(".csv") || file.ends_with(".toml") {
+                *file = folder.join(&*file).display().to_string();
+            }
+        }
+    }
+
+    fn violations(&self) -> Vec<String> {
+        let mut wrong = Vec::new();
+        if self.schema != 1 {
+            wrong.push(format!("schema = {}, this program reads 1", self.schema));
+        }
+        for (key, value, low, high) in [
+            ("truck.payload_kg", self.truck.payload_kg, 0.0, 100_000.0),
+            ("ego.s_m", self.ego.s_m, 0.0, 1e7),
+            ("ego.speed_m_s", self.ego.speed_m_s, 0.0, 40.0),
+            ("weather.wind_x_m_s", self.weather.wind_x_m_s, -60.0, 60.0),
+            ("weather.wind_y_m_s", self.weather.wind_y_m_s, -60.0, 60.0),
+            ("weather.air_temperature_k", self.weather.air_temperature_k, 200.0, 340.0),
+            ("weather.air_pressure_pa", self.weather.air_pressure_pa, 40_000.0, 110_000.0),
+            ("weather.adhesion_coeff", self.weather.adhesion_coeff, 0.05, 1.5),
+            ("run.tick_s", self.run.tick_s, 0.001, 0.1),
+            ("run.duration_s", self.run.duration_s, 0.0, 1e6),
+        ] {
+            if !(value >= low && value <= high) {
+                wrong.push(format!("{key} = {value} is outside {low} to {high}"));
+            }
+        }
+        wrong
+    }
+}

@@ -1,0 +1,150 @@
+//! The simulated truck as a [`Vehicle`]: the plant read and commanded directly.
+
+use std::sync::Arc;
+
+use dynamics::{DynamicsError, RoadPatch, SUBSTEP_S, TruckModel, TruckState};
+use road::{LaneKind, Road};
+use tractrix_core::{Command, EgoState, Stamped, Time, Vehicle, VehicleLimits};
+
+use crate::{EgoStart, SimError, Weather};
+
+/// A truck model on a road. A command given at `k` acts until the next one: reading the truck at a
+/// later time first moves the plant there.
+#[derive(Debug, Clone)]
+pub struct SimTruck {
+    model: Arc<TruckModel>,
+    road: Arc<Road>,
+    weather: Weather,
+    limits: VehicleLimits,
+    plant: TruckState,
+    ego: EgoState,
+    command: Command,
+    time: Time,
+}
+
+/// Relative fall of the standard atmosphere's pressure with altitude near sea level, 1/m (ISO 2533).
+const PRESSURE_LAPSE_1_M: f64 = 1.2e-4;
+/// Fall of the standard atmosphere's temperature, K/m (ISO 2533).
+const TEMPERATURE_LAPSE_K_M: f64 = 6.5e-3;
+
+impl SimTruck {
+    /// A truck at its start: in the middle of a lane, along it, rolling.
+    ///
+    /// # Errors
+    /// [`SimError::Scenario`] if the start is not on a drivable lane.
+    pub fn new(
+        model: Arc<TruckModel>,
+        road: Arc<Road>,
+        start: &EgoStart,
+        weather: &Weather,
+    ) -> Result<Self, SimError> {
+        let refuse = |why: String| SimError::Scenario { name: "ego".into(), why };
+        let limits = model.vehicle_limits()?;
+        let needs_m = limits.geometry.rear_m();
+        if start.s_m < needs_m || start.s_m + limits.geometry.front_m >= road.length_m() {
+            return Err(refuse(format!(
+                "ego.s_m = {} must be between {needs_m:.1} (the trailer's length) and the road's \
+                 length {:.1}",
+                start.s_m,
+                road.length_m()
+            )));
+        }
+        let drivable =
+            |l: &&road::LaneTrack| matches!(l.kind, LaneKind::Driving | LaneKind::Entry);
+        let lane = match start.lane {
+            Some(id) => road.lanes_at(start.s_m).find(|l| l.id == id),
+            None => road.lanes_at(start.s_m).filter(drivable).min_by(|a, b| {
+                a.center_d_m(start.s_m).total_cmp(&b.center_d_m(start.s_m))
+            }),
+        };
+        let lane = lane.ok_or_else(|| {
+            refuse(format!("no lane {:?} at ego.s_m = {}", start.lane, start.s_m))
+        })?;
+        let d_m = lane.center_d_m(start.s_m);
+        let at = road.at(start.s_m, d_m);
+        let plant = model.initial_state(at.x_m, at.y_m, at.heading_rad, start.speed_m_s);
+        let mut truck = Self {
+            model,
+            road,
+            weather: weather.clone(),
+            limits,
+            plant,
+            ego: EgoState { s_m: start.s_m, d_m, ..EgoState::default() },
+            command: Command::default(),
+            time: Time::ZERO,
+        };
+        truck.observe();
+        Ok(truck)
+    }
+
+    /// The state read last.
+    #[must_use]
+    pub const fn state(&self) -> &EgoState {
+        &self.ego
+    }
+
+    /// The plant behind it.
+    #[must_use]
+    pub const fn plant(&self) -> &TruckState {
+        &self.plant
+    }
+
+    /// The truck model.
+    #[must_use]
+    pub fn model(&self) -> &TruckModel {
+        &self.model
+    }
+
+    /// Road and weather where the truck is.
+    fn patch(&self) -> RoadPatch {
+        let at = self.road.at(self.ego.s_m, self.ego.d_m);
+        let start_z = self.road.at(0.0, 0.0).z_m;
+        let climbed = at.z_m - start_z;
+        let w = &self.weather;
+        RoadPatch {
+            grade_rad: at.grade_rad,
+            bank_rad: at.bank_rad,
+            wind_m_s: (w.wind_x_m_s, w.wind_y_m_s),
+            air_temperature_k: w.air_temperature_k - TEMPERATURE_LAPSE_K_M * climbed,
+            air_pressure_pa: w.air_pressure_pa * (1.0 - PRESSURE_LAPSE_1_M * climbed),
+            altitude_m: at.z_m,
+            adhesion_coeff: w.adhesion_coeff,
+        }
+    }
+
+    /// Refreshes the reported state from the plant.
+    fn observe(&mut self) {
+        let hint = self.ego.s_m;
+        let mut ego = self.model.ego_state(&self.plant, &self.patch());
+        if let Some(p) = self.road.project(ego.x_m, ego.y_m, Some(hint)) {
+            (ego.s_m, ego.d_m) = (p.s_m, p.d_m);
+        }
+        ego.z_m = self.road.at(ego.s_m, ego.d_m).z_m;
+        self.ego = ego;
+    }
+}
+
+impl Vehicle for SimTruck {
+    type Error = DynamicsError;
+
+    fn ego(&mut self, now: Time) -> Result<Stamped<EgoState>, DynamicsError> {
+        let ahead_s = now.seconds_since(self.time);
+        if ahead_s >= SUBSTEP_S {
+            let steps = libm::floor(ahead_s / SUBSTEP_S + 1e-6);
+            self.plant =
+                self.model.step(&self.plant, &self.command, &self.patch(), steps * SUBSTEP_S)?;
+            self.time = self.time.plus_nanos(Time::from_seconds(steps * SUBSTEP_S).0);
+            self.observe();
+        }
+        Ok(Stamped { time: self.time, value: self.ego })
+    }
+
+    fn command(&mut self, _now: Time, command: &Command) -> Result<(), DynamicsError> {
+        self.command = *command;
+        Ok(())
+    }
+
+    fn limits(&self) -> &VehicleLimits {
+        &self.limits
+    }
+}

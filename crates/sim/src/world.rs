@@ -1,0 +1,177 @@
+//! One world: road, truck, traffic, stack and metrics, moved tick by tick.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use dynamics::{TruckModel, TruckParameters};
+use planner::Stack;
+use road::Road;
+use tractrix_core::{Geometry, Recorder, Scene, Time, Vehicle};
+use traffic_client::NativeTraffic;
+
+use crate::scenario::TrafficKind;
+use crate::{Metrics, Scenario, SimError, SimTruck, Summary, Traffic};
+
+/// Whether a run goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// The run goes on.
+    Running,
+    /// The ego has reached the end of the road.
+    RoadEnd,
+    /// The scenario's duration is over.
+    TimeOver,
+}
+
+/// The closed loop. `Clone` is a snapshot: a clone continues bit for bit like its original.
+#[derive(Clone)]
+pub struct World {
+    scenario: Scenario,
+    road: Arc<Road>,
+    truck: SimTruck,
+    traffic: Traffic,
+    stack: Stack,
+    metrics: Metrics,
+    now: Time,
+    tick_ns: i64,
+    status: Status,
+}
+
+impl World {
+    /// Builds the world of a scenario. The same scenario and seed give the same bits.
+    ///
+    /// # Errors
+    /// [`SimError`] names the road, truck file, key or value that cannot be used.
+    pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, SimError> {
+        let road = Arc::new(Road::load(&scenario.road)?);
+        let params = TruckParameters::load(Path::new(&scenario.truck.file))?;
+        let model = TruckModel::new(params, scenario.truck.payload_kg)?;
+        Self::assemble(scenario, seed, road, model)
+    }
+
+    /// As [`Self::new`], with the road and the truck already read (batches share them).
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn assemble(
+        scenario: &Scenario,
+        seed: u64,
+        road: Arc<Road>,
+        model: TruckModel,
+    ) -> Result<Self, SimError> {
+        let truck = SimTruck::new(model, Arc::clone(&road), &scenario.ego, &scenario.weather)?;
+        let geometry = truck.limits().geometry;
+        let traffic = match scenario.traffic.source {
+            TrafficKind::None => Traffic::None(Scene::default()),
+            TrafficKind::Native => Traffic::Native(Box::new(NativeTraffic::new(
+                Arc::clone(&road),
+                scenario.traffic.native.clone(),
+                geometry,
+                seed,
+            )?)),
+        };
+        let stack = Stack::new(scenario.stack.clone(), truck.limits())
+            .map_err(|e| SimError::Stack(e.to_string()))?;
+        Ok(Self {
+            metrics: Metrics::new(geometry, Arc::clone(&road)),
+            scenario: scenario.clone(),
+            road,
+            truck,
+            traffic,
+            stack,
+            now: Time::ZERO,
+            tick_ns: Time::from_seconds(scenario.run.tick_s).0,
+            status: Status::Running,
+        })
+    }
+
+    /// One tick of the loop: reads the truck at the present time, plans, commands, records, and
+    /// moves the time on. After the end it does nothing.
+    ///
+    /// # Errors
+    /// [`SimError`] when the plant's state is no longer finite or the traffic source failed.
+    pub fn tick(&mut self, recorder: &mut impl Recorder) -> Result<Status, SimError> {
+        if self.status != Status::Running {
+            return Ok(self.status);
+        }
+        let mut both = (&mut self.metrics, recorder);
+        planner::drive_tick(
+            self.now,
+            &mut self.truck,
+            &mut self.traffic,
+            &mut self.stack,
+            &self.road,
+            &mut both,
+        )
+        .map_err(SimError::from_drive)?;
+        self.now = self.now.plus_nanos(self.tick_ns);
+        let front_m = self.truck.state().s_m + self.truck.limits().geometry.front_m;
+        if front_m + END_MARGIN_M >= self.road.length_m() {
+            self.status = Status::RoadEnd;
+        } else if self.now.seconds() >= self.scenario.run.duration_s {
+            self.status = Status::TimeOver;
+        }
+        Ok(self.status)
+    }
+
+    /// Runs to the end.
+    ///
+    /// # Errors
+    /// As [`Self::tick`].
+    pub fn run(&mut self, recorder: &mut impl Recorder) -> Result<Summary, SimError> {
+        while self.tick(recorder)? == Status::Running {}
+        Ok(self.summary())
+    }
+
+    /// The figures so far.
+    #[must_use]
+    pub fn summary(&self) -> Summary {
+        self.metrics.summary()
+    }
+
+    /// Time of the next tick.
+    #[must_use]
+    pub const fn now(&self) -> Time {
+        self.now
+    }
+
+    /// Whether the run goes on.
+    #[must_use]
+    pub const fn status(&self) -> Status {
+        self.status
+    }
+
+    /// The road.
+    #[must_use]
+    pub const fn road(&self) -> &Arc<Road> {
+        &self.road
+    }
+
+    /// Lengths of the ego.
+    #[must_use]
+    pub fn geometry(&self) -> Geometry {
+        self.truck.limits().geometry
+    }
+
+    /// The scenario.
+    #[must_use]
+    pub const fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The planning stack (to request a lane change from outside, say).
+    pub const fn stack_mut(&mut self) -> &mut Stack {
+        &mut self.stack
+    }
+
+    /// The truck.
+    #[must_use]
+    pub const fn truck(&self) -> &SimTruck {
+        &self.truck
+    }
+}
+
+/// The run ends when the front bumper is this close to the end of the road, m: the planner still
+/// sees road ahead of it.
+const END_MARGIN_M: f64 = 5.0;
