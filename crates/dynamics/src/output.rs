@@ -1,8 +1,8 @@
 //! What the truck reports, and what a planner may know about it.
 
 use tractrix_core::{
-    BrakeLimits, Curve, EgoState, GRAVITY_M_S2, Geometry, LateralLimits, PowertrainLimits,
-    PowertrainSignals, RPM_PER_RAD_S, RoadLoad, TrailerState, VehicleLimits,
+    BrakeLimits, Curve, EgoState, GRAVITY_M_S2, Geometry, PowertrainLimits, PowertrainSignals,
+    RPM_PER_RAD_S, RoadLoad, TrailerState, VehicleLimits,
 };
 
 use crate::effects::resistance::air_density_kg_m3;
@@ -154,8 +154,6 @@ impl TruckModel {
         };
         let idle = self.engine.idle_rad_s;
         let holding = self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, 350.0);
-        let m = self.lateral.yaw_sideslip();
-        let c = &m.stiffness_n_rad;
         Ok(VehicleLimits {
             geometry: self.geometry(),
             powertrain: PowertrainLimits {
@@ -192,22 +190,7 @@ impl TruckModel {
                 dead_time_s: p.brake.dead_time_s,
                 build_up_s: p.brake.lag_s + p.brake.max_pressure_pa / p.brake.fill_rate_pa_s * 0.5,
             },
-            lateral: LateralLimits {
-                steering_ratio: p.lateral.steering.ratio,
-                steering_lag_s: p.lateral.steering.lag_s,
-                tractor_mass_kg: m.tractor_mass_kg,
-                tractor_inertia_kg_m2: m.tractor_inertia_kg_m2,
-                trailer_mass_kg: m.trailer_mass_kg,
-                trailer_inertia_kg_m2: m.trailer_inertia_kg_m2,
-                trailer_cg_behind_hitch_m: m.trailer_cg_behind_hitch_m,
-                drive_half_spread_m: p.lateral.tractor.drive_half_spread_m,
-                trailer_half_spread_m: p.lateral.trailer.axle_half_spread_m,
-                steer_stiffness_n_rad: c[0],
-                drive_stiffness_n_rad: c[1] + c[2],
-                trailer_stiffness_n_rad: c[3] + c[4] + c[5],
-                rollover_accel_m_s2: self.lateral.load_transfer().rollover_accel_m_s2(),
-                max_road_wheel_rad: p.lateral.steering.max_wheel_rad / p.lateral.steering.ratio,
-            },
+            lateral: self.lateral.limits(),
         })
     }
 }

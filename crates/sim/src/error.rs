@@ -39,7 +39,20 @@ pub enum SimError {
     /// The traffic source failed.
     #[error(transparent)]
     Traffic(#[from] traffic_client::TrafficError),
+    /// Another failure of the loop.
+    #[error("{0}")]
+    Drive(String),
     /// The stack cannot be built from its configuration.
     #[error("stack: {0}")]
-    Stack(String),
+    Stack(#[from] planner::PlannerError),
+}
+
+impl From<planner::DriveError<dynamics::DynamicsError, traffic_client::TrafficError>> for SimError {
+    fn from(e: planner::DriveError<dynamics::DynamicsError, traffic_client::TrafficError>) -> Self {
+        match e {
+            planner::DriveError::Ego(e) | planner::DriveError::Command(e) => Self::Truck(e),
+            planner::DriveError::Traffic(e) => Self::Traffic(e),
+            other => Self::Drive(other.to_string()),
+        }
+    }
 }

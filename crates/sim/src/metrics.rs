@@ -2,9 +2,10 @@
 
 use std::collections::VecDeque;
 
+use planner::rss::{RearResponse, RssConfig};
 use road::Road;
 use serde::Serialize;
-use tractrix_core::{Geometry, Maneuver, Recorder, Tick, Time};
+use tractrix_core::{Geometry, Maneuver, Recorder, Tick, Time, VehicleLimits};
 
 use crate::{Footprint, footprints_overlap};
 
@@ -47,6 +48,8 @@ pub struct Summary {
 #[derive(Debug, Clone)]
 pub struct Metrics {
     geometry: Geometry,
+    rss: RssConfig,
+    response: RearResponse,
     road: std::sync::Arc<Road>,
     start: Option<(Time, f64)>,
     last: Option<Time>,
@@ -72,11 +75,13 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// Metrics of a truck of this geometry on this road.
+    /// Metrics of a truck with these limits on this road; gaps are judged by `rss`.
     #[must_use]
-    pub fn new(geometry: Geometry, road: std::sync::Arc<Road>) -> Self {
+    pub fn new(limits: &VehicleLimits, rss: &RssConfig, road: std::sync::Arc<Road>) -> Self {
         Self {
-            geometry,
+            geometry: limits.geometry,
+            response: rss.ego_response(limits),
+            rss: rss.clone(),
             road,
             start: None,
             last: None,
@@ -166,7 +171,14 @@ impl Metrics {
             self.min_ttc_s = self.min_ttc_s.min((gap_m / closing_m_s).max(0.0));
         }
         let grade_rad = self.road.at(ego.s_m, ego.d_m).grade_rad;
-        let below = gap_m < planner::gate::ego_safe_gap_m(ego.speed_m_s, ahead, grade_rad);
+        let safe_m = planner::rss::safe_gap_m(
+            ego.speed_m_s,
+            ahead.speed_m_s,
+            &self.response,
+            self.rss.brake_max_m_s2(ahead.class),
+            grade_rad,
+        );
+        let below = gap_m < safe_m;
         if below && !self.rss_below {
             self.rss_violations += 1;
         }

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use traffic_client::TrafficConfig;
+use traffic_client::native::TrafficConfig;
 
 use crate::SimError;
 

@@ -49,13 +49,13 @@ impl SimTruck {
                 road.length_m()
             )));
         }
-        let drivable =
-            |l: &&road::LaneTrack| matches!(l.kind, LaneKind::Driving | LaneKind::Entry);
+        let drivable = |l: &&road::LaneTrack| matches!(l.kind, LaneKind::Driving | LaneKind::Entry);
         let lane = match start.lane {
             Some(id) => road.lanes_at(start.s_m).find(|l| l.id == id),
-            None => road.lanes_at(start.s_m).filter(drivable).min_by(|a, b| {
-                a.center_d_m(start.s_m).total_cmp(&b.center_d_m(start.s_m))
-            }),
+            None => road
+                .lanes_at(start.s_m)
+                .filter(drivable)
+                .min_by(|a, b| a.center_d_m(start.s_m).total_cmp(&b.center_d_m(start.s_m))),
         };
         let lane = lane.ok_or_else(|| {
             refuse(format!("no lane {:?} at ego.s_m = {}", start.lane, start.s_m))

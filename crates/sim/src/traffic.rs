@@ -1,7 +1,8 @@
 //! The traffic source of a world.
 
 use tractrix_core::{EgoState, Scene, Time, TrafficSource};
-use traffic_client::{NativeTraffic, TrafficError};
+use traffic_client::TrafficError;
+use traffic_client::native::NativeTraffic;
 
 /// One of the sources that a scenario can name.
 #[derive(Debug, Clone)]

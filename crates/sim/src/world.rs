@@ -1,13 +1,12 @@
 //! One world: road, truck, traffic, stack and metrics, moved tick by tick.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use dynamics::{TruckModel, TruckParameters};
-use planner::Stack;
+use planner::{RatesConfig, Stack, StackConfig};
 use road::Road;
 use tractrix_core::{Geometry, Recorder, Scene, Time, Vehicle};
-use traffic_client::NativeTraffic;
+use traffic_client::native::{NativeTraffic, TrafficConfig};
 
 use crate::scenario::TrafficKind;
 use crate::{Metrics, Scenario, SimError, SimTruck, Summary, Traffic};
@@ -45,8 +44,8 @@ impl World {
     /// [`SimError`] names the road, truck file, key or value that cannot be used.
     pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, SimError> {
         let road = Arc::new(Road::load(&scenario.road)?);
-        let params = TruckParameters::load(Path::new(&scenario.truck.file))?;
-        let model = TruckModel::new(params, scenario.truck.payload_kg)?;
+        let params = TruckParameters::load(&scenario.truck.file)?;
+        let model = Arc::new(TruckModel::new(params, scenario.truck.payload_kg)?);
         Self::assemble(scenario, seed, road, model)
     }
 
@@ -58,23 +57,25 @@ impl World {
         scenario: &Scenario,
         seed: u64,
         road: Arc<Road>,
-        model: TruckModel,
+        model: Arc<TruckModel>,
     ) -> Result<Self, SimError> {
         let truck = SimTruck::new(model, Arc::clone(&road), &scenario.ego, &scenario.weather)?;
         let geometry = truck.limits().geometry;
         let traffic = match scenario.traffic.source {
             TrafficKind::None => Traffic::None(Scene::default()),
-            TrafficKind::Native => Traffic::Native(Box::new(NativeTraffic::new(
-                Arc::clone(&road),
-                scenario.traffic.native.clone(),
-                geometry,
-                seed,
-            )?)),
+            TrafficKind::Native => {
+                let config = TrafficConfig { seed, ..scenario.traffic.native.clone() };
+                Traffic::Native(Box::new(NativeTraffic::new(Arc::clone(&road), geometry, config)?))
+            }
         };
-        let stack = Stack::new(scenario.stack.clone(), truck.limits())
-            .map_err(|e| SimError::Stack(e.to_string()))?;
+        let config = StackConfig {
+            rates: RatesConfig::for_tick(scenario.run.tick_s),
+            ..scenario.stack.clone()
+        };
+        let metrics = Metrics::new(truck.limits(), &config.rss, Arc::clone(&road));
+        let stack = Stack::new(config, truck.limits())?;
         Ok(Self {
-            metrics: Metrics::new(geometry, Arc::clone(&road)),
+            metrics,
             scenario: scenario.clone(),
             road,
             truck,
@@ -104,7 +105,7 @@ impl World {
             &self.road,
             &mut both,
         )
-        .map_err(SimError::from_drive)?;
+        .map_err(SimError::from)?;
         self.now = self.now.plus_nanos(self.tick_ns);
         let front_m = self.truck.state().s_m + self.truck.limits().geometry.front_m;
         if front_m + END_MARGIN_M >= self.road.length_m() {

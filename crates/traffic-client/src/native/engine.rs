@@ -63,7 +63,7 @@ impl Clone for State {
 }
 
 /// The drivers' world.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(crate) struct Engine {
     pub(crate) config: Arc<TrafficConfig>,
     pub(crate) map: Arc<LaneMap>,

@@ -16,7 +16,7 @@ pub(crate) const NOBODY: u32 = u32::MAX;
 pub(crate) const EGO: u32 = u32::MAX - 1;
 
 /// Neighbours of every vehicle, by index into the fleet. Scratch: not part of the state.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone)]
 pub(crate) struct Neighbourhood {
     /// Lane tracks: own, left, right ([`NO_LANE`] if there is none here).
     pub(crate) lanes: Vec<[u16; 3]>,

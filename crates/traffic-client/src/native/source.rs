@@ -14,7 +14,7 @@ use crate::TrafficError;
 const TICK_NS: i64 = 100_000_000;
 
 /// IDM + MOBIL traffic on a road.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct NativeTraffic {
     engine: Engine,
     road: Arc<Road>,
