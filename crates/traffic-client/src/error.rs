@@ -41,4 +41,18 @@ pub enum TrafficError {
     /// A recording.
     #[error(transparent)]
     Replay(#[from] crate::replay::ReplayError),
+    /// A manifest is unusable, or names other inputs.
+    #[error("traffic manifest: {why}")]
+    Manifest {
+        /// What is wrong.
+        why: String,
+    },
+    /// A repeated run is not the same.
+    #[error("traffic differs from the manifest between ticks {from_tick} and {tick}")]
+    Diverged {
+        /// Last tick known to be equal.
+        from_tick: u64,
+        /// Tick at which the difference was seen.
+        tick: u64,
+    },
 }

@@ -5,12 +5,16 @@
 
 mod error;
 mod hash;
+mod mode;
 pub mod native;
+mod perception;
 mod philox;
 pub mod replay;
 pub mod sumo;
 
 pub use error::TrafficError;
+pub use mode::{Hashed, Manifest, Mode, TICKS_PER_HASH};
+pub use perception::{Perceived, PerceptionConfig};
 
 /// Longest step that a source takes at once, s.
 pub(crate) const LONGEST_JUMP_S: f64 = 600.0;

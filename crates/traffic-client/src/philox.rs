@@ -14,6 +14,8 @@ pub(crate) enum Stream {
     Arrival = 2,
     /// Spacing of the initial fill; index = position in the lane, number = lane track.
     Fill = 3,
+    /// Sensor noise; index = frame, the vehicle is in the key.
+    Perception = 4,
 }
 
 const M0: u64 = 0xD251_1F53;

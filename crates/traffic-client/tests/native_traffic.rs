@@ -6,6 +6,7 @@ use std::sync::Arc;
 use road::builtin;
 use tractrix_core::{EgoState, Geometry, Scene, Time, TrafficSource};
 use traffic_client::native::{Density, NativeTraffic, TrafficConfig};
+use traffic_client::{Hashed, Manifest, TrafficError};
 
 fn truck() -> Geometry {
     Geometry {
@@ -162,5 +163,38 @@ fn bad_input_is_refused_by_name() {
             .unwrap_err()
             .to_string()
             .contains("max_speed_m_s = -1")
+    );
+}
+
+#[test]
+fn resim_repeats_every_bit_and_names_the_tick_of_a_difference() {
+    let road = Arc::new(builtin::highway());
+    let native = |seed| {
+        let config = TrafficConfig::family(Density::Medium, 15.0, seed);
+        NativeTraffic::new(road.clone(), truck(), config).unwrap()
+    };
+    let inputs = Manifest { engine: "native".into(), seed: 3, ..Manifest::default() };
+    let run = |source: &mut Hashed<NativeTraffic>, disturbed_at: i64| -> Result<(), TrafficError> {
+        for k in 0..2000 {
+            let mut ego = ego_at(&road, 500.0 + 0.2 * k as f64, 20.0);
+            ego.s_m += if k >= disturbed_at { 0.5 } else { 0.0 };
+            source.advance(Time(k * 10_000_000), &ego)?;
+        }
+        Ok(())
+    };
+    let mut first = Hashed::record(native(3), inputs.clone());
+    run(&mut first, i64::MAX).unwrap();
+    let manifest = Manifest::from_toml(&first.manifest().to_toml().unwrap()).unwrap();
+    assert_eq!((manifest.ticks, manifest.hashes.len()), (2000, 20));
+    let again = || Hashed::verify(native(3), inputs.clone(), manifest.clone()).unwrap();
+    run(&mut again(), i64::MAX).unwrap();
+    let e = run(&mut again(), 850).unwrap_err();
+    assert!(matches!(e, TrafficError::Diverged { tick: 900.., .. }), "{e}");
+    let other = Manifest { seed: 4, ..inputs.clone() };
+    assert!(
+        Hashed::verify(native(4), other, manifest.clone())
+            .unwrap_err()
+            .to_string()
+            .contains("seed")
     );
 }

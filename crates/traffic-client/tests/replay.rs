@@ -138,7 +138,6 @@ fn recorded_stretches_get_their_own_road_and_replay_without_jumps() {
         for n in &scene.neighbours {
             if let Some(before) = last.neighbours.iter().find(|b| b.id == n.id) {
                 let moved = n.front_s_m - before.front_s_m;
-                // The recording itself steps back by up to a metre here and there.
                 assert!((-2.0..5.0).contains(&moved), "{} moved {moved} m", n.id);
                 odd += usize::from(!(-0.1..3.0).contains(&moved));
             }

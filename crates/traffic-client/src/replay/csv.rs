@@ -7,7 +7,8 @@
 //! | NGSIM | `Vehicle_ID`, `Frame_ID`, `Local_X`, `Local_Y` (feet, front, 10 Hz) | road |
 //! | highD | `frame`, `id`, `xVelocity` (bounding box, image axes, 25 Hz) | road |
 //!
-//! For highD, y points down in the image and a vehicle that drives to the left runs along falling
+//! The yaw of mapped frames points against the motion and is not used: headings come from the
+//! motion. For highD, y points down in the image and a vehicle that drives to the left runs along falling
 //! x; both carriageways are turned so that s grows in the direction of travel. Only one is kept.
 
 use tractrix_core::VehicleClass;
@@ -94,10 +95,9 @@ pub fn read_csv(
             ],
             Frame::Map,
         ),
-        Format::Mapped => (
-            [&["vehicle"], &["frame"], &["x"], &["y"], &["yaw_deg"], &[], &[], &[], &[]],
-            Frame::Map,
-        ),
+        Format::Mapped => {
+            ([&["vehicle"], &["frame"], &["x"], &["y"], &[], &[], &[], &[], &[]], Frame::Map)
+        }
         Format::Ngsim => (
             [
                 &["Vehicle_ID"],
@@ -166,7 +166,6 @@ pub fn read_csv(
             Format::Own => {}
             Format::Mapped => {
                 row.time_s = time / NGSIM_HZ;
-                row.yaw_rad = row.yaw_rad.map(f64::to_radians);
             }
             Format::Ngsim => {
                 row.length_m = length.map(|l| l * FOOT_M);
@@ -255,7 +254,7 @@ mod tests {
         let (_, rows) = read(
             "# origin x\nframe,vehicle,x,y,z_or_lane,lane_id,yaw_deg\n3,5,-828.0,-5949.1,299.5,30148,90\n",
         );
-        assert!((rows[0].yaw_rad.unwrap() - 1.5708).abs() < 1e-4);
+        assert_eq!(rows[0].yaw_rad, None);
         assert!((rows[0].time_s - 0.3).abs() < 1e-12);
         let (_, rows) = read(
             "id,type,length_m,width_m,t_s,x_m,y_m,heading_rad,v_mps,a_mps2\n363,car,4.1,2.4,0.1,21,-19,-0.7,10.7,\n",
