@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use planner::rss::{RearResponse, RssConfig};
+use planner::rss::{RearResponse, RssConfig, SafeGap};
 use road::Road;
 use serde::Serialize;
 use tractrix_core::{Geometry, Maneuver, Recorder, Tick, Time, VehicleLimits};
@@ -81,7 +81,7 @@ impl Metrics {
         Self {
             geometry: limits.geometry,
             response: rss.ego_response(limits),
-            rss: rss.clone(),
+            rss: *rss,
             road,
             start: None,
             last: None,
@@ -171,13 +171,9 @@ impl Metrics {
             self.min_ttc_s = self.min_ttc_s.min((gap_m / closing_m_s).max(0.0));
         }
         let grade_rad = self.road.at(ego.s_m, ego.d_m).grade_rad;
-        let safe_m = planner::rss::safe_gap_m(
-            ego.speed_m_s,
-            ahead.speed_m_s,
-            &self.response,
-            self.rss.brake_max_m_s2(ahead.class),
-            grade_rad,
-        );
+        let brake_m_s2 = self.rss.brake_max_m_s2(ahead.class);
+        let safe_m = SafeGap::new(&self.response, brake_m_s2, grade_rad)
+            .gap_m(ego.speed_m_s, ahead.speed_m_s);
         let below = gap_m < safe_m;
         if below && !self.rss_below {
             self.rss_violations += 1;
