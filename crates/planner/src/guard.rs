@@ -247,9 +247,7 @@ pub fn limit(
     let mut reasons = Vec::new();
     let planned = match &input.planned {
         None => {
-            if !input.minimal_risk {
-                reasons.push(GuardReason::NoPlan);
-            }
+            reasons.push(GuardReason::NoPlan);
             None
         }
         Some(c) if c.check_finite().is_err() => {

@@ -1,5 +1,4 @@
 //! The stack drives the tests' own truck.
-#![allow(clippy::unwrap_used)]
 
 mod support;
 

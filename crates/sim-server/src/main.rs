@@ -1,2 +1,37 @@
-//! The command line.
-fn main() {}
+//! The main program of Tractrix: command line, dashboard, recording.
+//!
+//! One file per command under `cmd/`. A run's world lives in its own thread ([`driver`]); the
+//! recording and the viewers get its ticks over bounded channels, lossless to the recording, lossy
+//! to viewers. Only this crate knows an async runtime.
+
+mod cli;
+mod cmd;
+mod dashboard;
+mod driver;
+mod failure;
+mod output;
+mod progress;
+mod provenance;
+mod recording;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use clap::error::ErrorKind;
+
+fn main() -> ExitCode {
+    let result = match cli::Cli::try_parse() {
+        Ok(cli) => cmd::dispatch(cli),
+        Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            return if e.print().is_ok() { ExitCode::SUCCESS } else { ExitCode::from(1) };
+        }
+        Err(e) => Err(cli::usage_failure(&e)),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output::error_line(&failure.line());
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

@@ -1,0 +1,22 @@
+//! One file per command.
+
+pub(crate) mod map;
+pub(crate) mod recover;
+pub(crate) mod run;
+pub(crate) mod scenario;
+
+use clap::Parser;
+
+use crate::cli::{Cli, Command};
+use crate::failure::Failure;
+
+/// Runs the command that was asked for.
+pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
+    match cli.command {
+        None => run::run(&run::Args::parse_from(["run"])),
+        Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Map(command)) => map::run(command),
+        Some(Command::Recover(args)) => recover::run(&args),
+        Some(Command::Scenario(command)) => scenario::run(&command),
+    }
+}

@@ -1,0 +1,81 @@
+//! `run`: the main job, a scenario in closed loop with dashboard and recording.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+use clap::builder::RangedU64ValueParser;
+
+use crate::cli::positive;
+use crate::driver::Pace;
+use crate::failure::Failure;
+
+mod execute;
+mod options;
+
+/// Drives a scenario in closed loop, with a live dashboard, and records it.
+#[derive(Debug, Parser)]
+pub(crate) struct Args {
+    /// A scenario file, or the name of a built-in one (`scenario list`).
+    #[arg(default_value = "highway")]
+    scenario: String,
+    /// Another road: .xodr, .csv, builtin:highway, builtin:test-site or builtin:flat.
+    #[arg(long)]
+    road: Option<String>,
+    /// Another truck: a truck file or a built-in name.
+    #[arg(long)]
+    truck: Option<String>,
+    /// Another payload on the trailer.
+    #[arg(long, value_name = "KG", value_parser = crate::cli::not_negative)]
+    payload_kg: Option<f64>,
+    /// The other vehicles: native or none; sumo and replay:FILE are not supported yet.
+    #[arg(long, value_name = "SOURCE")]
+    traffic: Option<String>,
+    /// How traffic reacts to the ego (pure, inter, re, rep); for sumo and replay traffic.
+    #[arg(long)]
+    mode: Option<String>,
+    /// Who decides on lane changes: keep, rules:50, rules:100, rules:150, mobil.
+    #[arg(long)]
+    decider: Option<String>,
+    /// Who sets the reference speed: cruise or predictive.
+    #[arg(long)]
+    speed_planner: Option<String>,
+    /// How the stack reaches the truck: direct; bus, can and socketcand are not supported yet.
+    #[arg(long, default_value = "direct")]
+    vehicle: String,
+    /// Ends the run after this simulated time.
+    #[arg(long, value_name = "S", value_parser = positive)]
+    duration: Option<f64>,
+    /// realtime, max, or simulated seconds per second [default: realtime, max with --headless].
+    #[arg(long)]
+    pace: Option<Pace>,
+    /// Seed of everything that is drawn at random.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Folder of run.mcap and summary.json [default: a new one under runs/].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// No dashboard.
+    #[arg(long)]
+    headless: bool,
+    /// Port of the dashboard on 127.0.0.1; 0 takes a free one.
+    #[arg(long, default_value_t = 8080, value_parser = RangedU64ValueParser::<u16>::new())]
+    port: u16,
+    /// Keeps the dashboard open after the end, until Ctrl-C.
+    #[arg(long, conflicts_with = "headless")]
+    keep_open: bool,
+    /// Prints the summary as one JSON object, and nothing else, on stdout.
+    #[arg(long)]
+    json: bool,
+    /// ROS 2 topics; not supported yet.
+    #[arg(long)]
+    ros2: bool,
+    /// Foxglove WebSocket; not supported yet.
+    #[arg(long)]
+    foxglove: bool,
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let scenario = options::scenario(args)?;
+    execute::execute(args, &scenario)
+}

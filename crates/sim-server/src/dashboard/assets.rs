@@ -1,0 +1,49 @@
+//! The page, embedded in the binary.
+
+use std::sync::LazyLock;
+
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+
+const HTML: &str = include_str!("page/index.html");
+const STYLE: &str = include_str!("page/style.css");
+const APP: &str = include_str!("page/app.js");
+const VIEW: &str = include_str!("page/view.js");
+const STRIPS: &str = include_str!("page/strips.js");
+
+/// Plotly.js as the crate `plotly` ships it: the first of its script elements.
+static PLOTLY: LazyLock<String> = LazyLock::new(|| {
+    let sources = plotly::Plot::offline_js_sources();
+    let script = sources.split_once('>').map_or("", |(_, rest)| rest);
+    script.split("</script>\n").next().unwrap_or_default().to_owned()
+});
+
+/// One embedded file by its path; none if there is no such file.
+pub(super) fn asset(path: &str) -> Option<Response> {
+    let (kind, body): (_, &'static str) = match path {
+        "/" => ("text/html; charset=utf-8", HTML),
+        "/assets/style.css" => ("text/css; charset=utf-8", STYLE),
+        "/assets/app.js" => (SCRIPT, APP),
+        "/assets/view.js" => (SCRIPT, VIEW),
+        "/assets/strips.js" => (SCRIPT, STRIPS),
+        "/assets/plotly.js" => (SCRIPT, PLOTLY.as_str()),
+        _ => return None,
+    };
+    Some(
+        ([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-cache")], body).into_response(),
+    )
+}
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plotly_is_the_whole_library_and_nothing_else() {
+        assert!(PLOTLY.len() > 1_000_000);
+        assert!(!PLOTLY.contains("<script"), "no second script element");
+        assert!(PLOTLY.contains("plotly.js v"));
+    }
+}

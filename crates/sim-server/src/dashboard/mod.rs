@@ -1,0 +1,61 @@
+//! The live dashboard: an HTTP and WebSocket server on the loopback interface with its page.
+//!
+//! The world's thread owns a [`Publisher`], which leaves the latest frame and the strip plots'
+//! columns in [`Shared`]; it never waits for a viewer. Each viewer takes the latest frame when it
+//! can (frames between are lost to it) and all columns since its last visit (none are lost).
+
+mod api;
+mod assets;
+mod frame;
+mod publisher;
+mod road_view;
+mod server;
+mod socket;
+mod strip;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::watch;
+
+pub(crate) use publisher::Publisher;
+pub(crate) use server::{Dashboard, bind};
+
+use self::strip::Strip;
+use crate::driver::ControlSender;
+
+/// What the world's thread leaves for the viewers.
+pub(crate) struct Shared {
+    /// The latest frame as JSON.
+    frame: watch::Sender<Arc<str>>,
+    /// Columns of the strip plots since the start.
+    strip: Mutex<Strip>,
+    /// The summary so far as JSON.
+    summary: Mutex<Arc<str>>,
+    /// The road as JSON; does not change.
+    road: Arc<str>,
+    /// To the world's thread.
+    controls: ControlSender,
+}
+
+impl Shared {
+    /// Nothing published yet.
+    pub(crate) fn new(road_json: String, controls: ControlSender) -> Arc<Self> {
+        Arc::new(Self {
+            frame: watch::Sender::new(Arc::from("")),
+            strip: Mutex::default(),
+            summary: Mutex::new(Arc::from("{}")),
+            road: road_json.into(),
+            controls,
+        })
+    }
+
+    fn strip(&self) -> MutexGuard<'_, Strip> {
+        self.strip.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn summary(&self) -> MutexGuard<'_, Arc<str>> {
+        self.summary.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+pub(crate) use road_view::road_json;

@@ -1,0 +1,334 @@
+// Bird's-eye view: the road from its lane borders, tractor and trailer with wheels, traffic, plan.
+// The truck stays in place and drives to the right; map coordinates are metres, y to the left.
+
+const COLOR = {
+  ground: "#0c1116", dot: "#1c2630", verge: "#10191a", asphalt: "#272e37", ramp: "#222932", shoulder: "#1c2229", paint: "#c9d3dd",
+  tractor: "#2f9df4", cab: "#0f4f86", trailer: "#c8d2dc", edge: "#0a0e13", wheel: "#040608", rim: "#6d7a88", frame: "#41566a",
+  car: "#f0a742", van: "#c98bea", truck: "#8fa3b8", followed: "#ff5d6c", path: "#39c5ff", text: "#8b99a8",
+};
+const BEHIND = 0.34; // the truck's place across the canvas
+
+export class BirdView {
+  constructor(canvas, map, road) {
+    this.canvas = canvas;
+    this.ctx = canvas.getContext("2d");
+    this.road = road;
+    this.zoom = 1;
+    this.frames = [];
+    this.minimap = new MiniMap(map, road);
+    canvas.addEventListener("wheel", (e) => { e.preventDefault(); this.zoomBy(Math.exp(-e.deltaY * 0.0015)); }, { passive: false });
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+    const loop = () => { this.draw(); requestAnimationFrame(loop); };
+    requestAnimationFrame(loop);
+  }
+
+  zoomBy(factor) { this.zoom = Math.min(6, Math.max(0.12, this.zoom * factor)); }
+
+  resize() {
+    const ratio = devicePixelRatio || 1;
+    this.width = this.canvas.clientWidth;
+    this.height = this.canvas.clientHeight;
+    this.canvas.width = Math.round(this.width * ratio);
+    this.canvas.height = Math.round(this.height * ratio);
+    this.ratio = ratio;
+  }
+
+  push(frame) {
+    frame.at = performance.now();
+    this.frames = [...this.frames.slice(-1), frame];
+  }
+
+  // The state one frame period ago, between the last two frames: smooth at the screen's rate.
+  state() {
+    const [a, b] = this.frames.length > 1 ? this.frames : [this.frames[0], this.frames[0]];
+    const span = Math.max(1, b.at - a.at);
+    const t = a === b ? 1 : Math.min(1, (performance.now() - b.at) / span);
+    const mix = (p, q) => p + (q - p) * t;
+    const before = new Map(a.neighbours.map((n) => [n.id, n]));
+    const pose = (p, q) => ({ ...q, x_m: mix(p.x_m, q.x_m), y_m: mix(p.y_m, q.y_m), yaw_rad: mix(p.yaw_rad, q.yaw_rad) });
+    const ego = pose(a.ego, b.ego);
+    for (const key of ["s_m", "articulation_rad", "road_wheel_rad"]) ego[key] = mix(a.ego[key], b.ego[key]);
+    return { ego, plan: b.plan, others: b.neighbours.map((n) => pose(before.get(n.id) ?? n, n)) };
+  }
+
+  draw() {
+    const { ctx, ratio, width, height } = this;
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    ctx.fillStyle = COLOR.ground;
+    ctx.fillRect(0, 0, width, height);
+    if (this.frames.length === 0 || width === 0) return;
+    const { ego, plan, others } = this.state();
+    const scale = this.scale = Math.max(width, 500) / 135 * this.zoom;
+    // screen from map: translate to the truck, turn by its heading, y up to y down
+    const cos = Math.cos(ego.yaw_rad), sin = Math.sin(ego.yaw_rad);
+    this.px = (x, y) => {
+      const dx = x - ego.x_m, dy = y - ego.y_m;
+      return [width * BEHIND + scale * (dx * cos + dy * sin), height * 0.54 - scale * (dy * cos - dx * sin)];
+    };
+    this.heading = ego.yaw_rad;
+    const window = [ego.s_m - width * BEHIND / scale - 40, ego.s_m + width * (1 - BEHIND) / scale + 40];
+    this.drawDots(ego);
+    this.drawRoad(window);
+    this.drawPath(plan, ego);
+    for (const other of others) this.drawOther(other, other.id === plan.following);
+    this.drawTruck(ego);
+    this.drawScale();
+    this.minimap.draw(ego);
+  }
+
+  // Dots fixed to the map, so that motion is seen beside the road.
+  drawDots(ego) {
+    const { ctx, width, height, scale } = this;
+    const step = scale > 5 ? 10 : scale > 1.5 ? 50 : 200;
+    const reach = Math.hypot(width, height) / scale;
+    ctx.fillStyle = COLOR.dot;
+    for (let x = Math.floor((ego.x_m - reach) / step) * step; x < ego.x_m + reach; x += step) {
+      for (let y = Math.floor((ego.y_m - reach) / step) * step; y < ego.y_m + reach; y += step) {
+        const [px, py] = this.px(x, y);
+        if (px > 0 && px < width && py > 0 && py < height) ctx.fillRect(px - 1, py - 1, 2, 2);
+      }
+    }
+  }
+
+  // -- road ----------------------------------------------------------------------------------------
+  drawRoad([from, to]) {
+    const { ctx, road } = this;
+    const step = road.border_step_m;
+    const range = (lane) => {
+      const count = lane.left_xy_m.length / 2;
+      return [Math.max(0, Math.floor((from - lane.s_start_m) / step)), Math.min(count - 1, Math.ceil((to - lane.s_start_m) / step))];
+    };
+    const outline = (lane, [first, last]) => {
+      ctx.beginPath();
+      for (let i = first; i <= last; i++) ctx.lineTo(...this.border(lane.left_xy_m, i));
+      for (let i = last; i >= first; i--) ctx.lineTo(...this.border(lane.right_xy_m, i));
+      ctx.closePath();
+    };
+    const seen = road.lanes.map((lane) => [lane, range(lane)]).filter(([, [first, last]]) => last > first);
+    ctx.strokeStyle = COLOR.verge;
+    ctx.lineWidth = 11 * this.scale;
+    ctx.lineJoin = "round";
+    for (const [lane, span] of seen) { outline(lane, span); ctx.stroke(); }
+    for (const [lane, span] of seen) {
+      ctx.fillStyle = lane.kind === "driving" ? COLOR.asphalt : lane.kind === "shoulder" ? COLOR.shoulder : COLOR.ramp;
+      ctx.strokeStyle = ctx.fillStyle;
+      ctx.lineWidth = 1;
+      outline(lane, span);
+      ctx.fill();
+      ctx.stroke();
+    }
+    ctx.strokeStyle = COLOR.paint;
+    ctx.lineWidth = Math.max(1, 0.16 * this.scale);
+    for (const [lane, [first, last]] of seen) {
+      for (const marking of lane.markings) {
+        const a = Math.max(first, marking.first), b = Math.min(last, marking.last);
+        if (b <= a) continue;
+        const xy = marking.side === "left" ? lane.left_xy_m : lane.right_xy_m;
+        // dashes of 6 m every 15 m, fixed to the road
+        ctx.setLineDash(marking.line === "dashed" ? [6 * this.scale, 9 * this.scale] : []);
+        ctx.lineDashOffset = ((lane.s_start_m + a * step) % 15) * this.scale;
+        ctx.globalAlpha = marking.line === "dashed" ? 0.75 : 0.9;
+        ctx.beginPath();
+        for (let i = a; i <= b; i++) ctx.lineTo(...this.border(xy, i));
+        ctx.stroke();
+      }
+    }
+    ctx.setLineDash([]);
+    ctx.globalAlpha = 1;
+    this.drawPosts(from, to);
+  }
+
+  border(xy, i) { return this.px(xy[2 * i], xy[2 * i + 1]); }
+
+  // Kilometre posts beside the rightmost border.
+  drawPosts(from, to) {
+    const { ctx, road } = this;
+    const step = this.scale > 2.5 ? 50 : this.scale > 0.8 ? 100 : 500;
+    ctx.fillStyle = COLOR.text;
+    ctx.font = "11px system-ui, sans-serif";
+    ctx.textAlign = "center";
+    for (let s = Math.ceil(Math.max(0, from) / step) * step; s <= Math.min(to, road.length_m); s += step) {
+      let low = null;
+      for (const lane of road.lanes) {
+        const i = Math.round((s - lane.s_start_m) / road.border_step_m);
+        if (i < 0 || i >= lane.right_xy_m.length / 2) continue;
+        const p = this.border(lane.right_xy_m, i);
+        if (low === null || p[1] > low[1]) low = p;
+      }
+      if (low === null) continue;
+      ctx.fillRect(low[0] - 0.5, low[1] + 5, 1, 6);
+      ctx.fillText((s / 1000).toFixed(step < 100 ? 2 : 1), low[0], low[1] + 23);
+    }
+  }
+
+  drawPath(plan, ego) {
+    const { ctx } = this;
+    const xy = plan.path_xy_m;
+    if (xy.length < 4) return;
+    const points = [];
+    for (let i = 0; i < xy.length; i += 2) points.push(this.px(xy[i], xy[i + 1]));
+    const front = this.px(ego.x_m, ego.y_m)[0];
+    const visible = points.filter((p) => p[0] >= front);
+    if (visible.length < 2) return;
+    const end = visible[visible.length - 1];
+    const fade = ctx.createLinearGradient(front, 0, Math.max(front + 1, end[0]), 0);
+    fade.addColorStop(0, COLOR.path);
+    fade.addColorStop(1, `${COLOR.path}30`);
+    ctx.strokeStyle = fade;
+    ctx.lineCap = ctx.lineJoin = "round";
+    for (const [width, alpha] of [[2.4 * this.scale, 0.13], [Math.max(1.6, 0.22 * this.scale), 0.95]]) {
+      ctx.lineWidth = width;
+      ctx.globalAlpha = alpha;
+      ctx.beginPath();
+      for (const p of visible) ctx.lineTo(...p);
+      ctx.stroke();
+    }
+    ctx.globalAlpha = 1;
+    ctx.lineCap = "butt";
+  }
+
+  // -- bodies --------------------------------------------------------------------------------------
+  // Runs `paint` in metres with x along the body and y to its left, origin at a map point.
+  onBody(x, y, yaw, paint) {
+    const { ctx } = this;
+    ctx.save();
+    ctx.translate(...this.px(x, y));
+    ctx.rotate(this.heading - yaw);
+    ctx.scale(this.scale, -this.scale);
+    paint(ctx);
+    ctx.restore();
+  }
+
+  box(ctx, rear, front, width, radius, fill) {
+    ctx.fillStyle = fill;
+    ctx.strokeStyle = COLOR.edge;
+    ctx.lineWidth = 0.08;
+    ctx.beginPath();
+    ctx.roundRect(rear, -width / 2, front - rear, width, radius);
+    ctx.fill();
+    ctx.stroke();
+  }
+
+  axle(ctx, x, width, twin, angle = 0) {
+    const tyre = twin ? 0.56 : 0.34;
+    ctx.fillStyle = COLOR.wheel;
+    ctx.strokeStyle = COLOR.rim;
+    ctx.lineWidth = 0.07;
+    for (const side of [-1, 1]) {
+      ctx.save();
+      ctx.translate(x, side * (width / 2 - tyre / 2 + 0.04));
+      ctx.rotate(angle);
+      ctx.beginPath();
+      ctx.roundRect(-0.5, -tyre / 2, 1.0, tyre, 0.12);
+      ctx.fill();
+      ctx.stroke();
+      ctx.restore();
+    }
+  }
+
+  drawTruck(ego) {
+    const t = this.road.truck;
+    const hx = ego.x_m + t.hitch_m * Math.cos(ego.yaw_rad), hy = ego.y_m + t.hitch_m * Math.sin(ego.yaw_rad);
+    const cabLength = 2.3;
+    this.onBody(ego.x_m, ego.y_m, ego.yaw_rad, (ctx) => {
+      this.box(ctx, t.tractor_rear_m, t.tractor_front_m - 0.3, 0.9, 0.1, COLOR.frame);
+      for (const x of t.drive_axles_m) this.axle(ctx, x, t.width_m, true);
+      this.axle(ctx, t.steer_axle_m, t.width_m, false, ego.road_wheel_rad);
+    });
+    this.onBody(hx, hy, ego.yaw_rad + ego.articulation_rad, (ctx) => {
+      for (const x of t.trailer_axles_m) this.axle(ctx, x, t.width_m + 0.1, true);
+      ctx.globalAlpha = 0.72;
+      this.box(ctx, t.trailer_rear_m, t.trailer_front_m, t.width_m, 0.12, COLOR.trailer);
+      ctx.globalAlpha = 1;
+      ctx.strokeStyle = "#9aa7b4";
+      ctx.lineWidth = 0.05;
+      ctx.beginPath();
+      for (let x = t.trailer_rear_m + 1.6; x < t.trailer_front_m - 0.5; x += 1.6) { ctx.moveTo(x, -t.width_m / 2 + 0.1); ctx.lineTo(x, t.width_m / 2 - 0.1); }
+      ctx.stroke();
+      ctx.fillStyle = COLOR.edge;
+      ctx.beginPath();
+      ctx.arc(0, 0, 0.2, 0, 2 * Math.PI);
+      ctx.fill();
+    });
+    this.onBody(ego.x_m, ego.y_m, ego.yaw_rad, (ctx) => {
+      const front = t.tractor_front_m;
+      this.box(ctx, front - cabLength, front, t.width_m, 0.35, COLOR.tractor);
+      ctx.fillStyle = COLOR.cab;
+      ctx.beginPath();
+      ctx.roundRect(front - 0.75, -t.width_m / 2 + 0.2, 0.5, t.width_m - 0.4, 0.15);
+      ctx.fill();
+    });
+  }
+
+  drawOther(n, followed) {
+    const fill = followed ? COLOR.followed : COLOR[n.class] ?? COLOR.car;
+    this.onBody(n.x_m, n.y_m, n.yaw_rad, (ctx) => {
+      const half = n.length_m / 2;
+      const round = n.class === "car" ? 0.55 : 0.25;
+      this.box(ctx, -half, half, n.width_m, round, fill);
+      ctx.fillStyle = "rgb(8 12 17 / .55)";
+      const glass = n.class === "car" ? [half * 0.28, half * 0.3] : [half - 0.95, 0.6];
+      ctx.fillRect(glass[0], -n.width_m / 2 + 0.18, glass[1], n.width_m - 0.36);
+      if (n.class === "car") ctx.fillRect(-half * 0.72, -n.width_m / 2 + 0.22, half * 0.25, n.width_m - 0.44);
+    });
+    if (this.scale > 3) {
+      const [x, y] = this.px(n.x_m, n.y_m);
+      this.ctx.fillStyle = followed ? COLOR.followed : COLOR.text;
+      this.ctx.font = "11px system-ui, sans-serif";
+      this.ctx.textAlign = "center";
+      this.ctx.fillText((n.speed_m_s * 3.6).toFixed(0), x, y - n.width_m / 2 * this.scale - 5);
+    }
+  }
+
+  drawScale() {
+    const { ctx, height } = this;
+    const length = [5, 10, 20, 50, 100, 200, 500, 1000].find((m) => m * this.scale > 70) ?? 1000;
+    const w = length * this.scale, x = 14, y = height - 16;
+    ctx.strokeStyle = ctx.fillStyle = COLOR.text;
+    ctx.lineWidth = 1.5;
+    ctx.beginPath();
+    ctx.moveTo(x, y - 5); ctx.lineTo(x, y); ctx.lineTo(x + w, y); ctx.lineTo(x + w, y - 5);
+    ctx.stroke();
+    ctx.font = "11px system-ui, sans-serif";
+    ctx.textAlign = "left";
+    ctx.fillText(`${length} m`, x + w + 7, y + 1);
+  }
+}
+
+// The whole road with the truck's place on it.
+class MiniMap {
+  constructor(canvas, road) {
+    this.canvas = canvas;
+    this.x = road.profile.x_m;
+    this.y = road.profile.y_m;
+    this.box = [Math.min(...this.x), Math.max(...this.x), Math.min(...this.y), Math.max(...this.y)];
+  }
+
+  draw(ego) {
+    const { canvas, x, y, box: [x0, x1, y0, y1] } = this;
+    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+    if (canvas.width !== Math.round(width * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    const ctx = canvas.getContext("2d");
+    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
+    ctx.clearRect(0, 0, width, height);
+    const margin = 12;
+    const scale = Math.min((width - 2 * margin) / Math.max(1, x1 - x0), (height - 2 * margin) / Math.max(1, y1 - y0));
+    const px = (mx, my) => [width / 2 + scale * (mx - (x0 + x1) / 2), height / 2 - scale * (my - (y0 + y1) / 2)];
+    ctx.strokeStyle = "#5a6877";
+    ctx.lineWidth = 2;
+    ctx.lineJoin = "round";
+    ctx.beginPath();
+    for (let i = 0; i < x.length; i++) ctx.lineTo(...px(x[i], y[i]));
+    ctx.stroke();
+    ctx.fillStyle = "#39c5ff";
+    ctx.strokeStyle = "#0b0f14";
+    ctx.beginPath();
+    ctx.arc(...px(ego.x_m, ego.y_m), 4.5, 0, 2 * Math.PI);
+    ctx.fill();
+    ctx.stroke();
+  }
+}

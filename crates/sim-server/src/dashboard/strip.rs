@@ -1,0 +1,62 @@
+//! Columns of the strip plots over distance.
+
+use serde::Serialize;
+use tractrix_core::Tick;
+
+/// Distance between two rows, m.
+const SPACING_M: f64 = 10.0;
+
+/// The columns since the start of the run, one row per [`SPACING_M`].
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub(crate) struct Strip {
+    s_m: Vec<f64>,
+    speed_m_s: Vec<f64>,
+    reference_speed_m_s: Vec<f64>,
+    engine_power_w: Vec<f64>,
+    gear: Vec<u8>,
+    fuel_used_g: Vec<f64>,
+    lateral_error_m: Vec<f64>,
+}
+
+impl Strip {
+    /// Number of rows.
+    pub(crate) fn len(&self) -> usize {
+        self.s_m.len()
+    }
+
+    /// Whether a row is due at this station.
+    pub(crate) fn is_due(&self, s_m: f64) -> bool {
+        self.s_m.last().is_none_or(|last| s_m >= last + SPACING_M)
+    }
+
+    /// Adds a row.
+    pub(crate) fn push(&mut self, tick: &Tick<'_>) {
+        let p = &tick.ego.powertrain;
+        self.s_m.push(round(tick.ego.s_m, 10.0));
+        self.speed_m_s.push(round(tick.ego.speed_m_s, 1e3));
+        self.reference_speed_m_s.push(round(tick.plan.reference_speed_m_s, 1e3));
+        self.engine_power_w.push(round(p.engine_power_w, 0.1));
+        self.gear.push(p.gear);
+        self.fuel_used_g.push(round(p.fuel_used_g, 10.0));
+        self.lateral_error_m.push(round(tick.plan.lateral_error_m, 1e4));
+    }
+
+    /// The rows from `first` on.
+    pub(crate) fn rows_from(&self, first: usize) -> Self {
+        let tail = |column: &[f64]| column.get(first..).unwrap_or_default().to_vec();
+        Self {
+            s_m: tail(&self.s_m),
+            speed_m_s: tail(&self.speed_m_s),
+            reference_speed_m_s: tail(&self.reference_speed_m_s),
+            engine_power_w: tail(&self.engine_power_w),
+            gear: self.gear.get(first..).unwrap_or_default().to_vec(),
+            fuel_used_g: tail(&self.fuel_used_g),
+            lateral_error_m: tail(&self.lateral_error_m),
+        }
+    }
+}
+
+/// Rounds for the wire: `per_unit` steps per unit.
+pub(super) fn round(value: f64, per_unit: f64) -> f64 {
+    (value * per_unit).round() / per_unit
+}

@@ -1,0 +1,54 @@
+//! How a command ends when it does not succeed.
+
+use std::path::Path;
+
+/// Why a command failed. The message is one line that names the key, file or value.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    /// Wrong usage or bad input: exit code 2.
+    #[error("{0}")]
+    Input(String),
+    /// The input was fine, the work failed (disk full, a model that stopped being finite): 1.
+    #[error("{0}")]
+    Work(String),
+}
+
+impl Failure {
+    /// Wrong usage or bad input, from any error.
+    pub(crate) fn input(error: impl std::fmt::Display) -> Self {
+        Self::Input(error.to_string())
+    }
+
+    /// Failed work, from any error.
+    pub(crate) fn work(error: impl std::fmt::Display) -> Self {
+        Self::Work(error.to_string())
+    }
+
+    /// A file that the user named cannot be read or written.
+    pub(crate) fn file(path: &Path, error: impl std::fmt::Display) -> Self {
+        Self::Input(format!("{}: {error}", path.display()))
+    }
+
+    /// Something that the contract names but this version does not do.
+    pub(crate) fn unsupported(what: &str) -> Self {
+        Self::Input(format!("{what} is not supported in this version"))
+    }
+
+    /// The process exit code.
+    pub(crate) const fn exit_code(&self) -> u8 {
+        match self {
+            Self::Input(_) => 2,
+            Self::Work(_) => 1,
+        }
+    }
+
+    /// The message on one line.
+    pub(crate) fn line(&self) -> String {
+        one_line(&self.to_string())
+    }
+}
+
+/// Folds line breaks and indentation into single spaces.
+pub(crate) fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}

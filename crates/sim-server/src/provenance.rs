@@ -1,0 +1,28 @@
+//! What produced an output: version and git revision.
+
+use serde::Serialize;
+
+/// Version of the JSON objects that this program writes.
+pub(crate) const SCHEMA: u32 = 1;
+
+/// The keys that open every JSON object.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(crate) struct Provenance {
+    schema: u32,
+    version: &'static str,
+    git_revision: &'static str,
+    /// Seed of the run; 0 for work without randomness.
+    seed: u64,
+}
+
+impl Provenance {
+    /// The provenance of an output that this seed determines.
+    pub(crate) const fn of_seed(seed: u64) -> Self {
+        Self { schema: SCHEMA, version: VERSION, git_revision: GIT_REVISION, seed }
+    }
+}
+
+/// Version of the workspace.
+pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// Git revision of the sources, `unknown` outside a repository.
+pub(crate) const GIT_REVISION: &str = env!("TRACTRIX_GIT_REVISION");
