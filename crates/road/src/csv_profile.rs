@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::line::Baker;
+use crate::bake::Baker;
 use crate::road::parallel_lanes;
 use crate::smooth::{LocalFit, local_quadratic};
 use crate::{Cubics, Jet, Line, Road, RoadError};

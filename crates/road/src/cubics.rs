@@ -6,6 +6,10 @@
 
 use alloc::{vec, vec::Vec};
 
+/// One cubic by its ends: (start m, end m, (value, slope) at the start, (value, slope) at the end).
+#[cfg(feature = "std")]
+pub(crate) type Span = (f64, f64, (f64, f64), (f64, f64));
+
 /// A function of station made of cubics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cubics {
@@ -111,6 +115,34 @@ impl Cubics {
             before = Some((s, m));
         }
         Self::hermite(&knots)
+    }
+
+    /// From spans in order; values may jump between spans. A span that continues the constant before it is merged into it.
+    #[cfg(feature = "std")]
+    pub(crate) fn from_spans(spans: &[Span], end_m: f64) -> Self {
+        let mut pieces: Vec<(f64, [f64; 4])> = Vec::with_capacity(spans.len());
+        for &(s0, s1, (y0, m0), (y1, m1)) in spans {
+            let h = s1 - s0;
+            if h <= 1e-4 {
+                continue;
+            }
+            let chord = (y1 - y0) / h;
+            let c = (3.0 * chord - 2.0 * m0 - m1) / h;
+            let d = (m0 + m1 - 2.0 * chord) / (h * h);
+            let level = (y1 - y0).abs() < 1e-12 && m0.abs() < 1e-14 && m1.abs() < 1e-14;
+            let piece = if level { [y0, 0.0, 0.0, 0.0] } else { [y0, m0, c, d] };
+            let same = pieces
+                .last()
+                .is_some_and(|p| level && p.1[1..] == [0.0; 3] && (p.1[0] - y0).abs() < 1e-12);
+            if !same {
+                pieces.push((s0, piece));
+            }
+        }
+        if pieces.is_empty() {
+            Self::default()
+        } else {
+            Self { end_m, ..Self::from_pieces(&pieces) }
+        }
     }
 
     fn piece(&self, s_m: f64) -> (usize, f64) {

@@ -6,6 +6,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
+mod bake;
 pub mod builtin;
 #[cfg(feature = "std")]
 mod csv_profile;
@@ -13,14 +14,17 @@ mod cubics;
 mod error;
 mod lane;
 mod line;
+#[cfg(feature = "std")]
+pub mod opendrive;
 mod road;
 mod shape;
 #[cfg(feature = "std")]
 mod smooth;
 
+pub use bake::BAKE_TOLERANCE_M;
 pub use cubics::Cubics;
 pub use error::RoadError;
 pub use lane::{LaneEnd, LaneKind, LaneSource, LaneTrack};
-pub use line::{BAKE_TOLERANCE_M, Knot, Line};
+pub use line::{Knot, Line};
 pub use road::{ProfilePoint, Road, RoadObject, RoadPoint, RoadPosition};
 pub use shape::{Jet, Placed, Shape};

@@ -1,19 +1,16 @@
 //! The reference line, ready for fast look-up: plan view, height and bank over station.
 //!
-//! A plan curve is baked into cells. A cell holds x and y as quintics in its own axes (origin at
-//! its start, first axis along its start heading), fitted to position, first and second derivative
-//! of the exact curve at both ends, and split until it meets the exact curve within
-//! [`BAKE_TOLERANCE_M`]. So heading and curvature belong to the same curve as the position, and a
-//! look-up costs one division and a few multiplications. Heights and bank are the exact cubics.
+//! A plan curve is baked into cells of quintics, within [`crate::BAKE_TOLERANCE_M`] of the exact
+//! curve. Heading and curvature belong to the same curve as the position, and a look-up costs one
+//! division and a few multiplications. Heights and bank are the exact cubics.
 
 use alloc::vec::Vec;
 
-use crate::{Cubics, Jet, Placed, Shape};
+#[cfg(feature = "std")]
+use crate::Jet;
+use crate::bake::{Baker, Cell};
+use crate::{Cubics, Placed, Shape};
 
-/// Largest distance between the baked and the exact curve, m (plus rounding of large coordinates).
-pub const BAKE_TOLERANCE_M: f64 = 1e-9;
-const LONGEST_CELL_M: f64 = 25.0;
-const SHORTEST_CELL_M: f64 = 0.02;
 /// A point farther than this from the line, or beyond its ends, has no road coordinates.
 const REACH_M: f64 = 200.0;
 
@@ -38,21 +35,6 @@ pub struct Knot {
     pub bank_rad: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Cell {
-    s_m: f64,
-    length_m: f64,
-    x_m: f64,
-    y_m: f64,
-    heading_rad: f64,
-    cos: f64,
-    sin: f64,
-    /// Coefficients of t..t⁵ along the start heading.
-    u: [f64; 5],
-    /// Coefficients of t..t⁵ to its left.
-    v: [f64; 5],
-}
-
 /// A reference line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
@@ -66,14 +48,15 @@ pub struct Line {
 
 impl Line {
     /// A line from placed elements, one after the other (their `s_m` is not used), with height and
-    /// bank over station. An empty list gives a line of one millimetre at the origin.
+    /// bank over station. Elements that are shorter than a tenth of a millimetre together give a
+    /// line of one millimetre, an empty list one at the origin.
     #[must_use]
     pub fn from_elements(elements: &[Placed], elevation: Cubics, bank: Cubics) -> Self {
         let mut baker = Baker::default();
         for e in elements {
             baker.push(e.length_m, &|ds| e.at(ds));
         }
-        baker.finish(elevation, bank)
+        baker.finish_at(elements.first(), elevation, bank)
     }
 
     /// A line that starts at the map's origin in direction `heading_rad` and has a curvature that
@@ -99,6 +82,16 @@ impl Line {
         baker.finish(elevation, bank)
     }
 
+    pub(crate) const fn from_cells(
+        cells: Vec<Cell>,
+        buckets: Vec<u32>,
+        length_m: f64,
+        elevation: Cubics,
+        bank: Cubics,
+    ) -> Self {
+        Self { cells, buckets, length_m, elevation, bank }
+    }
+
     /// Length, m.
     #[must_use]
     pub const fn length_m(&self) -> f64 {
@@ -122,6 +115,24 @@ impl Line {
         self.cells.iter().map(|c| c.s_m).chain(core::iter::once(self.length_m))
     }
 
+    /// The cells: (start m, end m, jet at the start, jet at the end), in map axes.
+    #[cfg(feature = "std")]
+    pub(crate) fn cells_with_jets(&self) -> Vec<(f64, f64, Jet, Jet)> {
+        let ends = self.joints_m().skip(1);
+        self.cells
+            .iter()
+            .zip(ends)
+            .map(|(c, end)| (c.s_m, end, c.jet(0.0), c.jet(c.length_m)))
+            .collect()
+    }
+
+    /// Point and derivatives by the cell that holds `inside_m`, in map axes.
+    #[cfg(feature = "std")]
+    pub(crate) fn jet_in(&self, s_m: f64, inside_m: f64) -> Jet {
+        let cell = &self.cells[self.cell(inside_m.clamp(0.0, self.length_m))];
+        cell.jet(s_m - cell.s_m)
+    }
+
     fn cell(&self, s_m: f64) -> usize {
         let n = self.buckets.len();
         let u = s_m / self.length_m * n as f64;
@@ -141,6 +152,7 @@ impl Line {
     }
 
     /// The line at the end of the piece that holds `inside_m`, as that piece sees it.
+    #[cfg(feature = "std")]
     pub(crate) fn at_in(&self, s_m: f64, inside_m: f64) -> Knot {
         self.knot(&self.cells[self.cell(inside_m.clamp(0.0, self.length_m))], s_m)
     }
@@ -236,133 +248,5 @@ impl Line {
         let (sin, cos) = libm::sincos(k.heading_rad);
         let across = (y_m - k.y_m) * cos - (x_m - k.x_m) * sin;
         (across.abs() <= REACH_M).then_some((s, across))
-    }
-}
-
-impl Cell {
-    /// Point and derivatives in the cell's axes, `t` metres from its start.
-    fn local(&self, t: f64) -> Jet {
-        let p = |c: &[f64; 5]| t * (c[0] + t * (c[1] + t * (c[2] + t * (c[3] + t * c[4]))));
-        let p1 = |c: &[f64; 5]| {
-            c[0] + t * (2.0 * c[1] + t * (3.0 * c[2] + t * (4.0 * c[3] + t * 5.0 * c[4])))
-        };
-        let p2 = |c: &[f64; 5]| 2.0 * c[1] + t * (6.0 * c[2] + t * (12.0 * c[3] + t * 20.0 * c[4]));
-        Jet {
-            point: [p(&self.u), p(&self.v)],
-            first: [p1(&self.u), p1(&self.v)],
-            second: [p2(&self.u), p2(&self.v)],
-        }
-    }
-
-    fn distance_to_start(&self, x_m: f64, y_m: f64) -> f64 {
-        libm::hypot(x_m - self.x_m, y_m - self.y_m)
-    }
-
-    /// The quintic that meets `a` at 0 and `b` at `length_m` with two derivatives.
-    fn fit(s_m: f64, length_m: f64, a: &Jet, b: &Jet, heading_before: Option<f64>) -> Self {
-        let wrapped = a.heading_rad();
-        let heading_rad = heading_before
-            .map_or(wrapped, |h| h + libm::remainder(wrapped - h, 2.0 * core::f64::consts::PI));
-        let (sin, cos) = libm::sincos(wrapped);
-        let turn = |[x, y]: [f64; 2]| [cos * x + sin * y, cos * y - sin * x];
-        let end = turn([b.point[0] - a.point[0], b.point[1] - a.point[1]]);
-        let (a1, a2, b1, b2) = (turn(a.first), turn(a.second), turn(b.first), turn(b.second));
-        let h = length_m;
-        let axis = |k: usize| {
-            let (m0, c0) = (a1[k], 0.5 * a2[k]);
-            let p = (end[k] - h * (m0 + h * c0)) / (h * h * h);
-            let q = (b1[k] - m0 - 2.0 * c0 * h) / (h * h);
-            let r = (b2[k] - 2.0 * c0) / h;
-            [
-                m0,
-                c0,
-                10.0 * p - 4.0 * q + 0.5 * r,
-                (-15.0 * p + 7.0 * q - r) / h,
-                (6.0 * p - 3.0 * q + 0.5 * r) / (h * h),
-            ]
-        };
-        let [x_m, y_m] = a.point;
-        Self { s_m, length_m, x_m, y_m, heading_rad, cos, sin, u: axis(0), v: axis(1) }
-    }
-}
-
-/// Collects cells.
-#[derive(Default)]
-pub(crate) struct Baker {
-    cells: Vec<Cell>,
-    s_m: f64,
-}
-
-impl Baker {
-    /// Appends a smooth curve of `length_m`, given with its derivatives by station.
-    pub(crate) fn push(&mut self, length_m: f64, curve: &dyn Fn(f64) -> Jet) {
-        if !(length_m > 1e-6) {
-            return;
-        }
-        let parts = libm::ceil(length_m / LONGEST_CELL_M).max(1.0) as usize;
-        let h = length_m / parts as f64;
-        for i in 0..parts {
-            self.refine(i as f64 * h, (i + 1) as f64 * h, curve);
-        }
-        self.s_m += length_m;
-    }
-
-    /// Appends the quintic between two points, `length_m` of station apart.
-    #[cfg(feature = "std")]
-    pub(crate) fn push_between(&mut self, length_m: f64, a: &Jet, b: &Jet) {
-        let cell = Cell::fit(self.s_m, length_m, a, b, self.end_heading_rad());
-        self.cells.push(cell);
-        self.s_m += length_m;
-    }
-
-    fn end_heading_rad(&self) -> Option<f64> {
-        self.cells.last().map(|c| {
-            let e = c.local(c.length_m);
-            c.heading_rad + libm::atan2(e.first[1], e.first[0])
-        })
-    }
-
-    fn refine(&mut self, from_m: f64, to_m: f64, curve: &dyn Fn(f64) -> Jet) {
-        let h = to_m - from_m;
-        let before = self.end_heading_rad();
-        let cell = Cell::fit(self.s_m + from_m, h, &curve(from_m), &curve(to_m), before);
-        let far = [0.25, 0.5, 0.75].into_iter().any(|f| {
-            let exact = curve(from_m + f * h).point;
-            let [u, v] = cell.local(f * h).point;
-            let x = cell.x_m + cell.cos * u - cell.sin * v;
-            let y = cell.y_m + cell.sin * u + cell.cos * v;
-            let scale = libm::fabs(x).max(libm::fabs(y));
-            libm::hypot(x - exact[0], y - exact[1]) > BAKE_TOLERANCE_M + 1e-15 * scale
-        });
-        if far && h > SHORTEST_CELL_M {
-            let mid = 0.5 * (from_m + to_m);
-            self.refine(from_m, mid, curve);
-            self.refine(mid, to_m, curve);
-        } else {
-            self.cells.push(cell);
-        }
-    }
-
-    /// Station reached, m.
-    pub(crate) const fn length_m(&self) -> f64 {
-        self.s_m
-    }
-
-    /// The line.
-    pub(crate) fn finish(mut self, elevation: Cubics, bank: Cubics) -> Line {
-        if self.cells.is_empty() {
-            self.push(1e-3, &|ds| Jet { point: [ds, 0.0], first: [1.0, 0.0], second: [0.0, 0.0] });
-        }
-        let (length_m, n) = (self.s_m, self.cells.len());
-        let mut buckets = Vec::with_capacity(n);
-        let mut cell = 0;
-        for i in 0..n {
-            let s = length_m * i as f64 / n as f64;
-            while cell + 1 < n && self.cells[cell + 1].s_m <= s {
-                cell += 1;
-            }
-            buckets.push(cell as u32);
-        }
-        Line { cells: self.cells, buckets, length_m, elevation, bank }
     }
 }

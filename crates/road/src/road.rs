@@ -275,6 +275,9 @@ impl Road {
             "builtin:highway" => Ok(crate::builtin::highway()),
             "builtin:test-site" => Ok(crate::builtin::test_site()),
             "builtin:flat" => Ok(crate::builtin::flat(15_000.0)),
+            _ if has_extension(name, "xodr") => {
+                crate::opendrive::Network::load(name)?.longest_route()
+            }
             _ if has_extension(name, "csv") => crate::csv_profile::read(name),
             _ => Err(RoadError::UnknownRoad { name: name.into() }),
         }

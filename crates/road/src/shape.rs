@@ -6,8 +6,9 @@
 //!
 //! A spiral is a clothoid: `θ(ds) = k0 ds + (k1 - k0) ds²/(2 L)`, its position the Fresnel integral
 //! of `(cos θ, sin θ)`, taken by Gauss-Legendre quadrature on panels that turn less than 0.4 rad
-//! (error below 1e-15 of the length). poly3 and normalized paramPoly3 are not parametrised by arc
-//! length; `ds` is turned into their parameter by inverting the arc-length integral.
+//! (error below 1e-15 of the length). poly3 and paramPoly3 are not parametrised by arc length
+//! (a paramPoly3 with pRange arcLength only nearly so); `ds` is turned into their parameter by
+//! inverting the arc-length integral, a paramPoly3 scaled so that its end lies at its stated length.
 
 /// One element of the plan view.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,17 +117,12 @@ impl Shape {
                 let u = invert_arc_length(speed, ds, ds);
                 by_arc_length([u, cubic(v, u)], [1.0, slope(v, u)], [0.0, bend(v, u)], 1.0)
             }
-            Self::ParamPoly3 { u, v, normalized: false } => Jet {
-                point: [cubic(u, ds), cubic(v, ds)],
-                first: [slope(u, ds), slope(v, ds)],
-                second: [bend(u, ds), bend(v, ds)],
-            },
-            Self::ParamPoly3 { u, v, normalized: true } => {
+            Self::ParamPoly3 { u, v, normalized } => {
+                let p_end = if normalized { 1.0 } else { length };
                 let speed = |p: f64| libm::hypot(slope(u, p), slope(v, p));
-                let total = integrate(speed, 0.0, 1.0);
                 // The whole curve is driven over the stated length, so that its end is met.
-                let scale = total / length;
-                let p = invert_arc_length(speed, ds * scale, ds / length);
+                let scale = integrate(speed, 0.0, p_end) / length;
+                let p = invert_arc_length(speed, ds * scale, ds / length * p_end);
                 by_arc_length(
                     [cubic(u, p), cubic(v, p)],
                     [slope(u, p), slope(v, p)],
