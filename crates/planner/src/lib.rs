@@ -22,6 +22,7 @@ mod limits_check;
 pub mod longitudinal;
 pub mod maneuver;
 pub mod path;
+pub mod pcc;
 pub mod reference_speed;
 pub mod road_load;
 pub mod rss;

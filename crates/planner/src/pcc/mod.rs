@@ -1,0 +1,44 @@
+//! Predictive cruise control (paper Section VI-B1, Eq. 18 to 24).
+//!
+//! The paper minimises fuel plus an acceleration penalty over a trip of given average speed, in the
+//! time domain, by a relaxed Newton method that takes a minute and has neither speed limits nor a
+//! power limit. Here the same objective is solved in the space domain with specific kinetic energy
+//! `E = v²/2` as state: dynamics and drag become linear, road and limits sit at fixed places, and
+//! what remains nonlinear (duration, full load, fuel) is linearised successively around driven
+//! profiles. Each subproblem is a convex quadratic programme.
+//!
+//! | file | idea |
+//! |---|---|
+//! | [`truck`] | traction, overrun and fuel per gear, from what the truck reports |
+//! | [`course`] | road at equal steps, speed ceilings, tuning |
+//! | [`drive`] | the truth: driving a profile through the nonlinear truck |
+//! | [`cruise`] | conventional cruise control, the baselines |
+//! | [`lin`], [`quadratic`] | the convex subproblem |
+//! | [`clarabel_backend`] | its solution by Clarabel |
+//! | [`search`] | joint search over speed and gear on a grid |
+//! | [`gears`] | shift places along a profile |
+//! | [`sqp`] | the iteration |
+//! | [`trip`] | whole trips against both baselines |
+//!
+//! Left out: wind, torque build-up, and the speed lost during a shift (charged as fuel).
+
+#[cfg(feature = "solver")]
+pub mod clarabel_backend;
+pub mod course;
+pub mod cruise;
+pub mod drive;
+mod error;
+pub mod gears;
+pub mod lin;
+pub mod quadratic;
+pub mod search;
+pub mod solution;
+pub mod sqp;
+pub mod trip;
+pub mod truck;
+
+pub use course::{SpeedBand, Tuning};
+pub use error::PccError;
+#[cfg(feature = "solver")]
+pub use trip::plan_trip;
+pub use trip::{TripRequest, TripResult, TripRow, TripStatus, TripTotals, plan_trip_with};

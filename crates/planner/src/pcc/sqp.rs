@@ -1,0 +1,280 @@
+//! Successive linearisation: solve, move, choose gears, again until the profile rests.
+//!
+//! Gears are fixed within a subproblem. They come from a joint search over speed and gear on a
+//! coarse grid at the current price of time; between the first subproblems the places of the shifts
+//! are refined along the profile, among gears that the search uses nearby, and then frozen, because
+//! a gear that flips back and forth would keep the profile from resting.
+//!
+//! Every subproblem is linearised around a *driven* profile, one that the truth reaches in the
+//! chosen gears, so that it has a feasible point.
+
+use alloc::vec::Vec;
+
+use super::course::{Course, Tuning};
+use super::drive::drive_profile;
+use super::gears::{GearChoice, choose_gears};
+use super::lin::{Subproblem, Terminal, TimeRule};
+use super::search::{EngineTables, SearchGrid, SearchPrices, search};
+use super::solution::{Solution, SolveStatus};
+use super::truck::{Drive, Truck};
+
+/// Passes after which gears are frozen.
+pub const GEAR_PASSES: usize = 4;
+
+/// A planning problem on a course.
+#[derive(Debug, Clone)]
+pub struct Problem<'a> {
+    /// The truck.
+    pub truck: &'a Truck,
+    /// The course.
+    pub course: &'a Course,
+    /// Tuning.
+    pub tuning: &'a Tuning,
+    /// Lowest energy per node, J/kg.
+    pub e_min: Vec<f64>,
+    /// Highest energy per node, J/kg.
+    pub e_max: Vec<f64>,
+    /// Energy at node 0, J/kg.
+    pub start_e: f64,
+    /// What holds at the end.
+    pub terminal: Terminal,
+    /// How time enters.
+    pub time: TimeRule,
+    /// Earliest time per node behind a vehicle ahead, s; `-∞` where it does not bind.
+    pub fence_s: Option<Vec<f64>>,
+    /// Whether coasting phases may open the driveline.
+    pub eco_roll: bool,
+    /// Gear engaged at the start.
+    pub start_gear: Option<Drive>,
+}
+
+/// Iteration limits of the successive linearisation.
+#[derive(Debug, Clone, Copy)]
+pub struct Iterations {
+    /// Most subproblems.
+    pub most: usize,
+    /// Passes with a gear choice.
+    pub gear_passes: usize,
+    /// Largest change of speed at rest, m/s.
+    pub rest_m_s: f64,
+}
+
+impl Iterations {
+    /// For a whole trip.
+    pub const TRIP: Self = Self { most: 9, gear_passes: GEAR_PASSES, rest_m_s: 0.03 };
+}
+
+/// Result of the successive linearisation.
+#[derive(Debug, Clone)]
+pub struct Profile {
+    /// How the last subproblem ended.
+    pub status: SolveStatus,
+    /// Energies per node, J/kg.
+    pub e_j_kg: Vec<f64>,
+    /// Gear per interval.
+    pub gears: Vec<Drive>,
+    /// Price of time, g/s.
+    pub beta_g_s: f64,
+    /// Interior-point iterations in all.
+    pub iterations: u32,
+    /// Subproblems solved.
+    pub subproblems: u32,
+    /// Worth of traction per interval, g per m/s².
+    pub worth: Vec<f64>,
+    /// Power-limited intervals.
+    pub limited: Vec<bool>,
+    /// Intervals at fuel cut-off.
+    pub cut: Vec<bool>,
+}
+
+/// A solver of subproblems; the last argument are the fence's earliest times.
+pub type Solver<'s> = dyn FnMut(&Subproblem, Terminal, TimeRule, Option<&[f64]>) -> Solution + 's;
+
+/// Length of an interval of the gear search, m.
+const SEARCH_INTERVAL_M: f64 = 100.0;
+/// Energy steps of the gear search that full traction covers in one interval.
+const SEARCH_STEPS: f64 = 14.0;
+
+impl Problem<'_> {
+    /// Gears and a first profile from the coarse joint search at the price `beta_g_s`; the course's
+    /// own cruise control where the grid holds no path.
+    #[must_use]
+    pub fn first_profile(
+        &self,
+        tables: &EngineTables,
+        beta_g_s: f64,
+        otherwise: (&[f64], &[Drive]),
+    ) -> (Vec<f64>, Vec<Drive>) {
+        let (truck, course) = (self.truck, self.course);
+        let n = course.n();
+        let merge = (libm::round(SEARCH_INTERVAL_M / course.h_m) as usize).clamp(1, n);
+        let v = libm::sqrt(2.0 * self.e_max.iter().sum::<f64>() / (n + 1) as f64);
+        let reach = truck.traction_m_s2(truck.strongest_gear(v), v) * course.h_m * merge as f64;
+        let step = (reach / SEARCH_STEPS).clamp(0.5, 4.0);
+        let end = match self.terminal {
+            Terminal::Fixed(e) => Some(e),
+            Terminal::Soft { .. } => None,
+        };
+        let bounds = (self.e_min.as_slice(), self.e_max.as_slice());
+        let grid = SearchGrid::new(course, merge, step, bounds, self.start_e, end);
+        let prices = SearchPrices {
+            beta_g_s,
+            shift_fuel_g: self.tuning.shift_fuel_g,
+            accel_penalty_g_s3_m2: self.tuning.accel_penalty_g_s3_m2,
+            brake_m_s2: course.brake_m_s2,
+            decel_m_s2: self.tuning.approach_decel_m_s2,
+        };
+        let start = match self.start_gear {
+            Some(Drive::Gear(g)) => Some(g),
+            _ => None,
+        };
+        let Some(path) = search(truck, tables, &grid, &prices, start) else {
+            return (otherwise.0.to_vec(), otherwise.1.to_vec());
+        };
+        let coarse = grid.n();
+        let (mut e, mut gears) = (Vec::with_capacity(n + 1), Vec::with_capacity(n));
+        for k in 0..coarse {
+            let (a, b) = (SearchGrid::node(n, coarse, k), SearchGrid::node(n, coarse, k + 1));
+            for i in a..b {
+                let f = (i - a) as f64 / (b - a) as f64;
+                e.push(path.e_j_kg[k] + f * (path.e_j_kg[k + 1] - path.e_j_kg[k]));
+                gears.push(Drive::Gear(path.gears[k]));
+            }
+        }
+        e.push(path.e_j_kg[coarse]);
+        for (k, value) in e.iter_mut().enumerate() {
+            *value = value.min(self.e_max[k]).max(self.e_min[k]);
+        }
+        (e, gears)
+    }
+}
+
+/// Runs the iteration from the profile `start` (energies per node) in `gears`.
+pub fn iterate(
+    problem: &Problem<'_>,
+    start: &[f64],
+    gears: &[Drive],
+    beta_g_s: f64,
+    iterations: Iterations,
+    solve: &mut Solver<'_>,
+) -> Profile {
+    let (truck, course, tuning) = (problem.truck, problem.course, problem.tuning);
+    let n = course.n();
+    let mut sub = Subproblem::default();
+    let mut now = Profile {
+        status: SolveStatus::Failed,
+        e_j_kg: start.to_vec(),
+        gears: gears.to_vec(),
+        beta_g_s,
+        iterations: 0,
+        subproblems: 0,
+        worth: alloc::vec![0.0; n],
+        limited: alloc::vec![false; n],
+        cut: alloc::vec![false; n],
+    };
+    let allowed = nearby_gears(gears, (libm::round(2.0 * SEARCH_INTERVAL_M / course.h_m)) as usize);
+    for pass in 0..iterations.most {
+        let beta = match problem.time {
+            TimeRule::Price(beta) => beta,
+            TimeRule::AtMost(_) => now.beta_g_s,
+        };
+        // Where a gear is too weak for the minimum speed the truck goes on at full power.
+        let targets: Vec<f64> =
+            now.e_j_kg.iter().zip(&problem.e_min).map(|(e, low)| e.max(*low)).collect();
+        let driven = drive_profile(truck, course, &targets, &now.gears, &[], 0.0).e_j_kg;
+        sub.linearise(truck, course, tuning, &driven, &now.gears, beta);
+        let frozen = pass >= iterations.gear_passes;
+        bounds(problem, &driven, &now.gears, frozen, &mut sub);
+        let mut found = solve(&sub, problem.terminal, problem.time, problem.fence_s.as_deref());
+        now.iterations += found.iterations;
+        now.subproblems += 1;
+        if found.status == SolveStatus::Infeasible && problem.time != TimeRule::Price(beta) {
+            // These gears are too slow for the trip time: as fast as a dear second makes it.
+            let dear = TimeRule::Price(2.0 * beta.max(1.0));
+            found = solve(&sub, problem.terminal, dear, problem.fence_s.as_deref());
+            now.iterations += found.iterations;
+            now.subproblems += 1;
+        }
+        if !matches!(found.status, SolveStatus::Solved | SolveStatus::AlmostSolved) {
+            if now.status == SolveStatus::Failed {
+                now.status = found.status;
+            }
+            return now;
+        }
+        now.status = found.status;
+        let mut step = 0.0f64;
+        for k in 1..=n {
+            let e = found.e_j_kg[k].clamp(sub.e_min[k].min(sub.e_max[k]), sub.e_max[k]);
+            step = step.max((libm::sqrt(2.0 * e) - libm::sqrt(2.0 * now.e_j_kg[k])).abs());
+            now.e_j_kg[k] = e;
+        }
+        now.e_j_kg[0] = problem.start_e;
+        now.beta_g_s = found.beta_g_s.max(0.0);
+        for k in 0..n {
+            let own = sub.marginal(k, sub.p(k, &now.e_j_kg, found.b_m_s2[k]).max(0.0));
+            let price = found.traction_price[k];
+            now.worth[k] = (own + price).max(0.0);
+            now.limited[k] = price > 0.02 * own;
+            now.cut[k] = price < -1e-3 * own;
+        }
+        if !frozen && pass > 0 {
+            let chosen = choose_gears(
+                truck,
+                course,
+                &now.e_j_kg,
+                &GearChoice {
+                    shift_fuel_g: tuning.shift_fuel_g,
+                    worth: Some((&now.worth, &now.limited)),
+                    start: problem.start_gear,
+                    allowed: Some(&allowed),
+                },
+            );
+            if chosen != now.gears {
+                now.gears = chosen;
+                continue;
+            }
+        }
+        if step < iterations.rest_m_s {
+            break;
+        }
+    }
+    now
+}
+
+/// Bit set of gears used within `reach` intervals, per interval.
+fn nearby_gears(gears: &[Drive], reach: usize) -> Vec<u32> {
+    let bit = |d: &Drive| if let Drive::Gear(g) = d { 1u32 << (g & 31) } else { 0 };
+    (0..gears.len())
+        .map(|k| {
+            let range = k.saturating_sub(reach)..(k + reach + 1).min(gears.len());
+            gears[range].iter().map(bit).fold(0, |a, b| a | b)
+        })
+        .collect()
+}
+
+/// Energy bounds of a subproblem: the problem's, widened to the driven profile so that there is a
+/// feasible point, and once gears are frozen the speed ranges of the gears.
+fn bounds(
+    problem: &Problem<'_>,
+    driven: &[f64],
+    gears: &[Drive],
+    frozen: bool,
+    sub: &mut Subproblem,
+) {
+    sub.e_max.copy_from_slice(&problem.e_max);
+    for (low, (&bound, &e)) in sub.e_min.iter_mut().zip(problem.e_min.iter().zip(driven)) {
+        *low = bound.min(e * (1.0 - 1e-5));
+    }
+    if !frozen {
+        return;
+    }
+    for (k, &drive) in gears.iter().enumerate() {
+        let Drive::Gear(g) = drive else { continue };
+        let (low, high) = problem.truck.speed_range_m_s(g as usize);
+        for node in [k, k + 1] {
+            let here = driven[node];
+            sub.e_min[node] = sub.e_min[node].max((0.5 * low * low).min(here * 0.995));
+            sub.e_max[node] = sub.e_max[node].min((0.5 * high * high).max(here * 1.005));
+        }
+    }
+}
