@@ -1,0 +1,92 @@
+//! What can go wrong before a diagnosis: files, tables, too little data, another truck.
+
+use std::path::PathBuf;
+
+/// Errors of the crate. Expected outcomes (nothing found, not observable) are values of
+/// [`crate::Diagnosis`], not errors.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DiagnosisError {
+    /// A file cannot be opened or read.
+    #[error("{path}: {why}")]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        why: String,
+    },
+    /// `drives.toml` does not have the contract's form.
+    #[error("{path}: {why}")]
+    Index {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A table cannot be decoded.
+    #[error("{path}: {why}")]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A column that nothing can be done without is missing or unusable.
+    #[error("drive {drive}: column {column} is needed and {why}")]
+    Column {
+        /// Name of the drive.
+        drive: String,
+        /// Name of the column.
+        column: &'static str,
+        /// Why it cannot be used.
+        why: String,
+    },
+    /// The time column runs backwards.
+    #[error(
+        "drive {drive}: time_s runs backwards at row {row} ({before_s} s, then {after_s} s): rows are shuffled"
+    )]
+    ShuffledTime {
+        /// Name of the drive.
+        drive: String,
+        /// First row that is earlier than the row before it, 0-based.
+        row: usize,
+        /// Time of the row before it, s.
+        before_s: f64,
+        /// Time of that row, s.
+        after_s: f64,
+    },
+    /// A drive is too short to say anything.
+    #[error("drive {drive}: {seconds:.1} s of usable data, at least {needed_s:.0} s are needed")]
+    TooShort {
+        /// Name of the drive.
+        drive: String,
+        /// Length, s.
+        seconds: f64,
+        /// Length needed, s.
+        needed_s: f64,
+    },
+    /// No drive is left to learn from.
+    #[error("{what}")]
+    NoDrives {
+        /// What is missing.
+        what: String,
+    },
+    /// The drives were made with another truck than the truck file describes.
+    #[error(
+        "the drives do not belong to this truck file: engine speed over wheel speed in gear {gear} is {measured:.3}, the truck file says {expected:.3} (1/m, as (rad/s)/(m/s))"
+    )]
+    WrongTruck {
+        /// Gear with most data among those that disagree.
+        gear: usize,
+        /// Measured ratio, 1/m.
+        measured: f64,
+        /// Ratio of the truck file, 1/m.
+        expected: f64,
+    },
+    /// The truck file is not usable.
+    #[error("truck: {0}")]
+    Truck(String),
+    /// A matrix that must be positive definite is not: the data hold non-finite numbers.
+    #[error("numerics: {0}")]
+    Numerics(String),
+}

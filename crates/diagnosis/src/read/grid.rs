@@ -1,0 +1,325 @@
+//! From a raw table to channels on the uniform grid, with every defect noted.
+
+use crate::drive::Drive;
+use crate::finding::{Action, Finding, FindingKind};
+use crate::{Channel, DiagnosisError};
+
+use super::RawTable;
+
+/// Shortest drive that is read, s.
+const MIN_DRIVE_S: f64 = 60.0;
+/// Part of a channel that may be missing or implausible and is interpolated over.
+const MAX_BAD_FRAC: f64 = 0.02;
+/// A channel that must move and does not for this long while the truck drives is stuck, s.
+const STUCK_S: f64 = 30.0;
+
+pub(super) fn to_grid(
+    name: &str,
+    table: &RawTable,
+    findings: &mut Vec<Finding>,
+) -> Result<Drive, DiagnosisError> {
+    let column = |column, why: &str| DiagnosisError::Column {
+        drive: name.to_owned(),
+        column,
+        why: why.to_owned(),
+    };
+    let mut note = |channel: Option<&str>, time_s, kind, action| {
+        findings.push(Finding {
+            drive: name.to_owned(),
+            channel: channel.map(str::to_owned),
+            time_s,
+            kind,
+            action,
+        });
+    };
+    let time = table.column("time_s").ok_or_else(|| column("time_s", "missing"))?;
+    let keep = usable_rows(name, time, &mut note)?;
+    let t: Vec<f64> = keep.iter().map(|&i| time[i]).collect();
+    let seconds = t.last().unwrap_or(&0.0) - t.first().unwrap_or(&0.0);
+    if t.len() < 2 || seconds < MIN_DRIVE_S {
+        return Err(DiagnosisError::TooShort {
+            drive: name.to_owned(),
+            seconds,
+            needed_s: MIN_DRIVE_S,
+        });
+    }
+    let len = (seconds / Drive::STEP_S + 1e-6).floor() as usize + 1;
+    if len > 50_000_000 {
+        return Err(column("time_s", "spans more than four weeks: not seconds"));
+    }
+    note_gaps(&t, &mut note);
+    let mut drive = Drive::new(name, t[0], len);
+    for (label, values) in &table.columns {
+        if label == "time_s" {
+            continue;
+        }
+        let Some(channel) = Channel::of(label) else {
+            note(Some(label), None, FindingKind::UnknownColumn, Action::Kept);
+            continue;
+        };
+        if values.len() != time.len() {
+            return Err(column(channel.name(), "shorter than time_s"));
+        }
+        let mut v: Vec<f64> = keep.iter().map(|&i| values[i]).collect();
+        if clean(channel, &t, &mut v, &mut note) {
+            drive.set(channel, resample(&t, &v, t[0], len, channel.is_discrete()));
+        }
+    }
+    let speed = drive.get(Channel::SpeedMS).map(<[f64]>::to_vec);
+    let Some(mut speed) = speed else {
+        return Err(column("speed_m_s", "missing or unusable"));
+    };
+    speed_unit(&mut drive, &mut speed, &mut note);
+    stuck(&mut drive, &speed, &mut note);
+    Ok(drive)
+}
+
+type Note<'a> = dyn FnMut(Option<&str>, Option<f64>, FindingKind, Action) + 'a;
+
+/// Rows with finite, increasing time.
+fn usable_rows(name: &str, time: &[f64], note: &mut Note<'_>) -> Result<Vec<usize>, DiagnosisError> {
+    let (mut keep, mut bad, mut twice) = (Vec::with_capacity(time.len()), 0, 0);
+    let (mut first_bad, mut first_twice) = (None, None);
+    let mut last = f64::NEG_INFINITY;
+    for (row, &t) in time.iter().enumerate() {
+        if !t.is_finite() {
+            bad += 1;
+            first_bad = first_bad.or(Some(last));
+        } else if t == last {
+            twice += 1;
+            first_twice = first_twice.or(Some(t));
+        } else if t < last {
+            return Err(DiagnosisError::ShuffledTime {
+                drive: name.to_owned(),
+                row,
+                before_s: last,
+                after_s: t,
+            });
+        } else {
+            keep.push(row);
+            last = t;
+        }
+    }
+    if bad > 0 {
+        let kind = FindingKind::NonFinite { samples: bad };
+        note(Some("time_s"), first_bad.filter(|t| t.is_finite()), kind, Action::RowsDropped);
+    }
+    if twice > 0 {
+        let kind = FindingKind::DuplicateTime { rows: twice };
+        note(Some("time_s"), first_twice, kind, Action::RowsDropped);
+    }
+    Ok(keep)
+}
+
+fn note_gaps(t: &[f64], note: &mut Note<'_>) {
+    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let typical = steps[steps.len() / 2];
+    for w in t.windows(2) {
+        let seconds = w[1] - w[0];
+        if seconds > 10.0 * typical {
+            let kind = FindingKind::Gap { seconds };
+            note(None, Some(w[0]), kind, Action::Interpolated);
+        }
+    }
+}
+
+/// Interpolates over bad samples; false if the channel is beyond use.
+fn clean(channel: Channel, t: &[f64], v: &mut [f64], note: &mut Note<'_>) -> bool {
+    let (lo, hi) = channel.plausible();
+    let name = Some(channel.name());
+    let bad: Vec<bool> = v.iter().map(|x| !x.is_finite()).collect();
+    let missing = bad.iter().filter(|b| **b).count();
+    let first = |b: &[bool]| b.iter().position(|b| *b).map(|i| t[i]);
+    let enough = |n: usize| n as f64 <= MAX_BAD_FRAC * t.len() as f64;
+    if missing == v.len() {
+        let kind = FindingKind::NonFinite { samples: missing };
+        note(name, first(&bad), kind, Action::ChannelDropped);
+        return false;
+    }
+    if missing > 0 {
+        let ok = enough(missing);
+        let action = if ok { Action::Interpolated } else { Action::ChannelDropped };
+        note(name, first(&bad), FindingKind::NonFinite { samples: missing }, action);
+        if !ok {
+            return false;
+        }
+    }
+    let largest = v.iter().filter(|x| x.is_finite()).fold(0.0_f64, |a, x| a.max(x.abs()));
+    if let Some((suspected, factor)) = unit_error(channel, v, largest) {
+        v.iter_mut().for_each(|x| *x *= factor);
+        note(name, None, FindingKind::WrongUnit { suspected }, Action::Corrected);
+    }
+    let outside: Vec<bool> = v.iter().map(|x| x.is_finite() && !(lo..=hi).contains(x)).collect();
+    let implausible = outside.iter().filter(|b| **b).count();
+    if implausible > 0 {
+        let value = v.iter().zip(&outside).find(|p| *p.1).map_or(f64::NAN, |p| *p.0);
+        let ok = enough(implausible + missing);
+        let action = if ok { Action::Interpolated } else { Action::ChannelDropped };
+        let kind = FindingKind::Implausible { samples: implausible, value };
+        note(name, first(&outside), kind, action);
+        if !ok {
+            return false;
+        }
+    }
+    let mask: Vec<bool> = bad.iter().zip(&outside).map(|(a, b)| *a || *b).collect();
+    interpolate_over(t, v, &mask);
+    true
+}
+
+/// Units that are often mistaken and leave a range that no truck shows.
+fn unit_error(channel: Channel, v: &[f64], largest: f64) -> Option<(&'static str, f64)> {
+    let mut sorted: Vec<f64> = v.iter().copied().filter(|x| x.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted[sorted.len() / 2];
+    match channel {
+        Channel::AcceleratorPedalFrac | Channel::EngineBrakeFrac
+            if largest > 1.5 && largest <= 101.0 =>
+        {
+            Some(("percent", 0.01))
+        }
+        Channel::CoolantTempDegc | Channel::AmbientTempDegc if median > 200.0 => None,
+        Channel::BaroPressurePa if (40.0..110.0).contains(&median) => Some(("kPa", 1e3)),
+        Channel::BaroPressurePa if (400.0..1100.0).contains(&median) => Some(("hPa", 1e2)),
+        Channel::BrakePressureKpa if largest > 5e3 => Some(("Pa", 1e-3)),
+        Channel::GradeFrac if largest > 0.5 && largest < 25.0 => Some(("percent", 0.01)),
+        Channel::YawRateRadS | Channel::TrailerYawRateRadS if largest > 4.0 => {
+            Some(("deg/s", core::f64::consts::PI / 180.0))
+        }
+        Channel::SteeringWheelRad if largest > 40.0 => {
+            Some(("deg", core::f64::consts::PI / 180.0))
+        }
+        _ => None,
+    }
+}
+
+fn interpolate_over(t: &[f64], v: &mut [f64], bad: &[bool]) {
+    let mut last: Option<usize> = None;
+    let mut i = 0;
+    while i < v.len() {
+        if !bad[i] {
+            last = Some(i);
+            i += 1;
+            continue;
+        }
+        let next = (i..v.len()).find(|&j| !bad[j]);
+        let end = next.unwrap_or(v.len());
+        for j in i..end {
+            v[j] = match (last, next) {
+                (Some(a), Some(b)) => v[a] + (v[b] - v[a]) * (t[j] - t[a]) / (t[b] - t[a]),
+                (Some(a), None) => v[a],
+                (None, Some(b)) => v[b],
+                (None, None) => 0.0,
+            };
+        }
+        i = end;
+    }
+}
+
+/// Linear interpolation to the grid; the previous value for discrete channels.
+fn resample(t: &[f64], v: &[f64], start: f64, len: usize, discrete: bool) -> Vec<f64> {
+    let mut out = Vec::with_capacity(len);
+    let mut i = 0;
+    for k in 0..len {
+        let x = start + k as f64 * Drive::STEP_S;
+        while i + 1 < t.len() && t[i + 1] <= x + 1e-9 {
+            i += 1;
+        }
+        let at = if i + 1 < t.len() && x > t[i] + 1e-9 && !discrete {
+            v[i] + (v[i + 1] - v[i]) * (x - t[i]) / (t[i + 1] - t[i])
+        } else {
+            v[i]
+        };
+        out.push(at);
+    }
+    out
+}
+
+/// A wheel speed in km/h or mph shows against the GPS or in the engine's gearing only; against the
+/// GPS it is certain.
+fn speed_unit(drive: &mut Drive, speed: &mut Vec<f64>, note: &mut Note<'_>) {
+    let Some(gps) = drive.get(Channel::GpsSpeedMS) else { return };
+    let mut ratios: Vec<f64> =
+        speed.iter().zip(gps).filter(|p| *p.1 > 3.0).map(|p| p.0 / p.1).collect();
+    if ratios.len() < 100 {
+        return;
+    }
+    ratios.sort_by(f64::total_cmp);
+    let ratio = ratios[ratios.len() / 2];
+    let of = |c: Channel, f: f64, d: &Drive| {
+        d.get(c).map(|x| x.iter().map(|y| y * f).collect::<Vec<f64>>())
+    };
+    for (unit, factor) in [("km/h", 3.6), ("mph", 2.236_936)] {
+        for (channel, scale) in
+            [(Channel::SpeedMS, ratio / factor), (Channel::GpsSpeedMS, 1.0 / (ratio * factor))]
+        {
+            if (scale - 1.0).abs() < 0.1
+                && let Some(x) = of(channel, 1.0 / factor, drive)
+            {
+                let kind = FindingKind::WrongUnit { suspected: unit };
+                note(Some(channel.name()), None, kind, Action::Corrected);
+                if channel == Channel::SpeedMS {
+                    speed.clone_from(&x);
+                }
+                drive.set(channel, x);
+                return;
+            }
+        }
+    }
+}
+
+fn stuck(drive: &mut Drive, speed: &[f64], note: &mut Note<'_>) {
+    let channels: Vec<Channel> =
+        Channel::all().filter(|c| !c.may_rest() && drive.has(*c)).collect();
+    for channel in channels {
+        let Some(v) = drive.get(channel) else { continue };
+        let (mut from, mut longest, mut at, mut total) = (0, 0, 0, 0);
+        for i in 1..=v.len() {
+            let still = i < v.len()
+                && v[i] == v[i - 1]
+                && speed[i] > 5.0
+                && !(channel == Channel::FuelRateGS || channel == Channel::EngineTorquePercent)
+                    | (i < v.len() && v[i] != 0.0);
+            if still {
+                continue;
+            }
+            let run = i - from;
+            if run as f64 * Drive::STEP_S > STUCK_S {
+                total += run;
+                if run > longest {
+                    (longest, at) = (run, from);
+                }
+            }
+            from = i;
+        }
+        if longest > 0 {
+            let drop = total as f64 > 0.2 * v.len() as f64 && channel != Channel::SpeedMS;
+            let kind = FindingKind::Stuck { seconds: longest as f64 * Drive::STEP_S };
+            let time = drive.start_s + at as f64 * Drive::STEP_S;
+            let action = if drop { Action::ChannelDropped } else { Action::Kept };
+            note(Some(channel.name()), Some(time), kind, action);
+            if drop {
+                drive.remove(channel);
+            }
+        }
+    }
+}
+
+/// Grade and curvature at the map position, where the table does not carry them.
+pub(super) fn fill_from_map(drive: &mut Drive) {
+    let (Some(s), Some(map)) = (drive.get(Channel::SMapM).map(<[f64]>::to_vec), drive.map.clone())
+    else {
+        return;
+    };
+    for (channel, y) in
+        [(Channel::GradeFrac, &map.grade_frac), (Channel::Curvature1M, &map.curvature_1_m)]
+    {
+        if !drive.has(channel)
+            && let Ok(curve) =
+                tractrix_core::Curve::new(channel.name(), map.s_m.clone(), y.clone())
+        {
+            let v = s.iter().map(|s| curve.at(*s)).collect();
+            drive.set(channel, v);
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! Reads a folder of measured drives: `drives.toml` and one table per drive.
+
+mod csv_table;
+mod grid;
+mod parquet_table;
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use crate::drive::RoadMap;
+use crate::{DiagnosisError, DriveSet};
+
+/// Columns of one file by name, as written, `NaN` where a value is missing.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RawTable {
+    /// Name and samples of each column.
+    pub columns: Vec<(String, Vec<f64>)>,
+}
+
+impl RawTable {
+    /// Samples of a column.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        self.columns.iter().find(|c| c.0 == name).map(|c| c.1.as_slice())
+    }
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Index {
+    schema: u32,
+    truck: String,
+    #[serde(default)]
+    drive: Vec<Entry>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Entry {
+    name: String,
+    file: String,
+    map: Option<String>,
+    reported_mass_kg: Option<f64>,
+    tyres_warm_at_start: Option<bool>,
+}
+
+/// Reads `dir/drives.toml` and the tables that it names.
+///
+/// Defects that leave a drive usable are in [`DriveSet::findings`], with channel, time and what
+/// was done about them.
+///
+/// # Errors
+/// A file that cannot be read or decoded, an index of another form, a drive without usable
+/// `time_s` or `speed_m_s`, with shuffled rows, or shorter than a minute.
+pub fn read_drives(dir: &Path) -> Result<DriveSet, DiagnosisError> {
+    let path = dir.join("drives.toml");
+    let text = std::fs::read_to_string(&path)
+        .map_err(|e| DiagnosisError::Io { path: path.clone(), why: e.to_string() })?;
+    let bad = |why: String| DiagnosisError::Index { path: path.clone(), why };
+    let index: Index = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
+    if index.schema != 1 {
+        return Err(bad(format!("schema = {}, this program reads schema 1", index.schema)));
+    }
+    if index.drive.is_empty() {
+        return Err(bad("no [[drive]] in it".into()));
+    }
+    let mut set = DriveSet { truck: index.truck, drives: Vec::new(), findings: Vec::new() };
+    for entry in &index.drive {
+        if set.drives.iter().any(|d| d.name == entry.name) {
+            return Err(bad(format!("two drives are named {:?}", entry.name)));
+        }
+        let table = read_table(&dir.join(&entry.file))?;
+        let mut drive = grid::to_grid(&entry.name, &table, &mut set.findings)?;
+        if let Some(m) = entry.reported_mass_kg {
+            if !(1000.0..=200_000.0).contains(&m) {
+                return Err(bad(format!("drive {}: reported_mass_kg = {m}", entry.name)));
+            }
+            drive.reported_mass_kg = Some(m);
+        }
+        drive.tyres_warm_at_start = entry.tyres_warm_at_start;
+        if let Some(map) = &entry.map {
+            drive.map = Some(road_map(&dir.join(map))?);
+            grid::fill_from_map(&mut drive);
+        }
+        set.drives.push(drive);
+    }
+    Ok(set)
+}
+
+/// Reads one table, CSV if the name ends in `.csv`, else Parquet.
+///
+/// # Errors
+/// [`DiagnosisError::Io`] or [`DiagnosisError::Table`].
+pub fn read_table(path: &Path) -> Result<RawTable, DiagnosisError> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+        csv_table::read(path)
+    } else {
+        parquet_table::read(path)
+    }
+}
+
+fn road_map(path: &Path) -> Result<RoadMap, DiagnosisError> {
+    let t = read_table(path)?;
+    let bad = |why: String| DiagnosisError::Table { path: path.to_owned(), why };
+    let need = |n: &str| {
+        t.column(n).map(<[f64]>::to_vec).ok_or_else(|| bad(format!("column {n} is missing")))
+    };
+    let s_m = need("s_m")?;
+    let grade_frac = need("grade_frac")?;
+    let curvature_1_m =
+        t.column("curvature_1_m").map_or_else(|| vec![0.0; s_m.len()], <[f64]>::to_vec);
+    if s_m.len() < 2 || s_m.windows(2).any(|w| !(w[1] > w[0])) {
+        return Err(bad("s_m must increase and have two rows at least".into()));
+    }
+    if grade_frac.iter().chain(&curvature_1_m).any(|v| !v.is_finite()) {
+        return Err(bad("a value is not finite".into()));
+    }
+    Ok(RoadMap { s_m, grade_frac, curvature_1_m })
+}
