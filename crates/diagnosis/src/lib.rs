@@ -6,6 +6,10 @@ mod channel;
 pub mod clock;
 mod drive;
 mod error;
+mod param;
+mod plant;
+mod plant_reference;
+mod replay;
 mod finding;
 mod read;
 
@@ -13,4 +17,6 @@ pub use channel::Channel;
 pub use drive::{Drive, DriveSet, RoadMap};
 pub use error::DiagnosisError;
 pub use finding::{Action, Finding, FindingKind};
+pub use plant::Plant;
+pub use replay::Module;
 pub use read::{RawTable, read_drives, read_table};

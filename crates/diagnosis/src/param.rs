@@ -1,0 +1,184 @@
+//! The parameters that the replay knows: sizes of effects, their shapes, and tolerances of
+//! instruments. One vector serves as fitted causes (common to all drives), as tolerances (random,
+//! per drive) and as calibration (common, small, learned from drives that are in order).
+
+/// Values of all parameters; zero is the truck file.
+pub(crate) type Theta = [f64; PARAMS];
+
+/// Index of a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(usize)]
+pub(crate) enum P {
+    Rolling,
+    Drag,
+    Headwind,
+    WindX,
+    WindY,
+    Mass,
+    GradeBias,
+    MapShift,
+    WarmupAmp,
+    WarmupTau,
+    DrivelineLoss,
+    FanPower,
+    FanStart,
+    DragBrake,
+    Friction,
+    Altitude,
+    AltitudeStart,
+    HeatAir,
+    HeatAirStart,
+    HeatCoolant,
+    HeatCoolantStart,
+    TurboLag,
+    PedalDelay,
+    ShiftTime,
+    FuelLow,
+    FuelLowLoad,
+    BrakeGain,
+    Fade,
+    FadeStart,
+    BrakeDelay,
+    RetarderStage,
+    RetarderBrake,
+    RetarderCoast,
+    SpeedScale,
+    YawBias,
+    SteerRatio,
+    SteerOffset,
+    FreePlay,
+    SteerLag,
+    CFront,
+    CDrive,
+    CTrailer,
+    PayloadX,
+    Bank,
+    Crosswind,
+    GpsLag,
+    ImuBias,
+    AltitudeOffset,
+    HeadingOffset,
+    AccelYBias,
+    TrailerYawBias,
+    FuelScale,
+    TorqueScale,
+    EngineBrakeScale,
+    SpeedLag,
+    FuelLag,
+    TorqueReport,
+}
+
+/// Number of parameters.
+pub(crate) const PARAMS: usize = 57;
+
+/// What is known of a parameter before any drive.
+pub(crate) struct Spec {
+    pub(crate) p: P,
+    /// Key in `diagnosis.json`, with the unit where it has one.
+    pub(crate) key: &'static str,
+    pub(crate) unit: &'static str,
+    /// Standard deviation of its size as a cause.
+    pub(crate) prior: f64,
+    /// Bounds.
+    pub(crate) lo: f64,
+    pub(crate) hi: f64,
+    /// Step of the secant.
+    pub(crate) step: f64,
+    /// Standard deviation of its scatter between drives of one truck; 0: none.
+    pub(crate) tolerance: f64,
+    /// Standard deviation of its common calibration; 0: none.
+    pub(crate) calibration: f64,
+}
+
+const fn s(
+    p: P,
+    key: &'static str,
+    unit: &'static str,
+    (prior, lo, hi, step): (f64, f64, f64, f64),
+    tolerance: f64,
+    calibration: f64,
+) -> Spec {
+    Spec { p, key, unit, prior, lo, hi, step, tolerance, calibration }
+}
+
+/// All parameters, in the order of [`P`]. Priors and tolerances are engineering ranges for highway
+/// trucks: load sheets within 1 %, weather wind along the road 1 m/s, tyres and drag area 2 %.
+pub(crate) const SPECS: [Spec; PARAMS] = [
+    s(P::Rolling, "coefficient_scale", "1", (0.2, -0.6, 1.5, 0.05), 0.015, 0.0),
+    s(P::Drag, "cd_a_scale", "1", (0.15, -0.6, 1.0, 0.05), 0.015, 0.0),
+    s(P::Headwind, "headwind_m_s", "m/s", (3.0, -15.0, 15.0, 0.5), 0.3, 0.0),
+    s(P::WindX, "wind_to_x_m_s", "m/s", (4.0, -20.0, 20.0, 2.0), 0.0, 0.0),
+    s(P::WindY, "wind_to_y_m_s", "m/s", (4.0, -20.0, 20.0, 2.0), 0.0, 0.0),
+    s(P::Mass, "mass_scale", "1", (0.08, -0.4, 0.6, 0.01), 0.005, 0.0),
+    s(P::GradeBias, "grade_frac", "1", (0.002, -0.02, 0.02, 0.0005), 1.5e-4, 0.0),
+    s(P::MapShift, "shift_m", "m", (40.0, -300.0, 300.0, 10.0), 4.0, 0.0),
+    s(P::WarmupAmp, "cold_extra_frac", "1", (0.3, -0.1, 1.5, 0.1), 0.0, 0.0),
+    s(P::WarmupTau, "ln_time_constant", "1", (0.5, -1.2, 1.2, 0.2), 0.0, 0.0),
+    s(P::DrivelineLoss, "extra_loss_frac", "1", (0.03, -0.05, 0.3, 0.01), 0.003, 0.0),
+    s(P::FanPower, "fan_power_kw", "kW", (20.0, -5.0, 90.0, 5.0), 0.0, 0.0),
+    s(P::FanStart, "coolant_start_offset_k", "K", (5.0, -14.0, 14.0, 1.5), 0.0, 0.0),
+    s(P::DragBrake, "force_n", "N", (600.0, -200.0, 6000.0, 100.0), 30.0, 0.0),
+    s(P::Friction, "friction_scale", "1", (0.25, -0.7, 1.5, 0.1), 0.015, 0.0),
+    s(P::Altitude, "torque_loss_per_km", "1/km", (0.08, -0.02, 0.5, 0.03), 0.0, 0.0),
+    s(P::AltitudeStart, "start_offset_m", "m", (600.0, -1500.0, 1200.0, 100.0), 0.0, 0.0),
+    s(P::HeatAir, "torque_loss_per_10_k_air", "1/(10 K)", (0.06, -0.02, 0.5, 0.02), 0.0, 0.0),
+    s(P::HeatAirStart, "air_start_offset_k", "K", (6.0, -20.0, 12.0, 1.0), 0.0, 0.0),
+    s(P::HeatCoolant, "torque_loss_per_10_k_coolant", "1/(10 K)", (0.1, -0.02, 0.6, 0.03), 0.0, 0.0),
+    s(P::HeatCoolantStart, "coolant_start_offset_k", "K", (5.0, -14.0, 14.0, 1.0), 0.0, 0.0),
+    s(P::TurboLag, "lag_s", "s", (0.4, -0.4, 4.0, 0.1), 0.01, 0.05),
+    s(P::PedalDelay, "delay_s", "s", (0.2, -0.1, 1.5, 0.05), 0.004, 0.05),
+    s(P::ShiftTime, "extra_time_s", "s", (0.4, -0.8, 3.0, 0.1), 0.01, 0.05),
+    s(P::FuelLow, "extra_frac", "1", (0.2, -0.6, 2.0, 0.05), 0.0, 0.0),
+    s(P::FuelLowLoad, "ln_load", "1", (0.35, -1.0, 1.0, 0.2), 0.0, 0.0),
+    s(P::BrakeGain, "gain_scale", "1", (0.2, -0.8, 1.5, 0.05), 0.015, 0.0),
+    s(P::Fade, "loss_per_100_k", "1", (0.3, -0.1, 2.0, 0.05), 0.0, 0.0),
+    s(P::FadeStart, "start_offset_k", "K", (50.0, -100.0, 200.0, 10.0), 0.0, 0.0),
+    s(P::BrakeDelay, "delay_s", "s", (0.2, -0.2, 2.0, 0.05), 0.005, 0.06),
+    s(P::RetarderStage, "torque_per_stage_nm", "Nm", (800.0, -300.0, 5000.0, 100.0), 0.0, 0.0),
+    s(P::RetarderBrake, "force_n_per_m_s2", "N s2/m", (4000.0, -2e3, 4e4, 400.0), 0.0, 0.0),
+    s(P::RetarderCoast, "torque_nm", "Nm", (800.0, -300.0, 5000.0, 100.0), 0.0, 0.0),
+    s(P::SpeedScale, "scale", "1", (0.02, -0.2, 0.2, 0.005), 0.001, 0.0),
+    s(P::YawBias, "bias_rad_s", "rad/s", (0.004, -0.05, 0.05, 0.001), 3e-4, 0.0),
+    s(P::SteerRatio, "ratio_scale", "1", (0.08, -0.4, 0.6, 0.02), 0.004, 0.0),
+    s(P::SteerOffset, "offset_rad", "rad", (0.05, -0.6, 0.6, 0.01), 0.005, 0.0),
+    s(P::FreePlay, "free_play_rad", "rad", (0.06, 0.0, 0.6, 0.02), 0.0, 0.0),
+    s(P::SteerLag, "lag_s", "s", (0.12, -0.08, 1.0, 0.03), 0.004, 0.06),
+    s(P::CFront, "stiffness_scale", "1", (0.2, -0.7, 1.0, 0.05), 0.01, 0.0),
+    s(P::CDrive, "stiffness_scale", "1", (0.2, -0.6, 1.0, 0.05), 0.01, 0.0),
+    s(P::CTrailer, "stiffness_scale", "1", (0.2, -0.8, 1.5, 0.05), 0.01, 0.0),
+    s(P::PayloadX, "shift_rearward_m", "m", (0.6, -3.0, 2.0, 0.1), 0.03, 0.0),
+    s(P::Bank, "bank_rad", "rad", (0.015, -0.12, 0.12, 0.003), 3e-4, 0.0),
+    s(P::Crosswind, "wind_to_left_m_s", "m/s", (4.0, -20.0, 20.0, 1.0), 0.2, 0.0),
+    s(P::GpsLag, "lag_s", "s", (0.2, -5.0, 5.0, 0.05), 0.02, 0.2),
+    s(P::ImuBias, "bias_m_s2", "m/s2", (0.1, -2.0, 2.0, 0.02), 0.02, 0.0),
+    s(P::AltitudeOffset, "offset_m", "m", (10.0, -100.0, 100.0, 1.0), 10.0, 0.0),
+    s(P::HeadingOffset, "offset_rad", "rad", (0.1, -1.0, 1.0, 0.01), 0.05, 0.0),
+    s(P::AccelYBias, "bias_m_s2", "m/s2", (0.1, -2.0, 2.0, 0.02), 0.02, 0.0),
+    s(P::TrailerYawBias, "bias_rad_s", "rad/s", (0.004, -0.05, 0.05, 0.001), 3e-4, 0.0),
+    s(P::FuelScale, "scale", "1", (0.05, -0.4, 0.6, 0.01), 0.005, 0.01),
+    s(P::TorqueScale, "scale", "1", (0.05, -0.4, 0.4, 0.01), 0.003, 0.0),
+    s(P::EngineBrakeScale, "scale", "1", (0.1, -0.6, 1.0, 0.05), 0.015, 0.0),
+    s(P::SpeedLag, "lag_s", "s", (0.1, -1.0, 1.0, 0.02), 0.004, 0.05),
+    s(P::FuelLag, "lag_s", "s", (0.1, -0.3, 2.0, 0.02), 0.004, 0.05),
+    s(P::TorqueReport, "scale", "1", (0.05, -0.3, 0.3, 0.01), 0.003, 0.01),
+];
+
+impl P {
+    pub(crate) fn spec(self) -> &'static Spec {
+        &SPECS[self as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_parameter_stands_at_its_own_index() {
+        for (i, spec) in SPECS.iter().enumerate() {
+            assert_eq!(spec.p as usize, i, "{}", spec.key);
+            assert!(spec.lo < 0.0 || spec.p == P::FreePlay);
+            assert!(spec.step > 0.0 && spec.hi > spec.step);
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! Modular replay: every module of the truck model is driven by *measured* interface signals and
+//! compared with its own measured output, so that an error in one module does not travel through
+//! the driver or through another module.
+//!
+//! A residual is measured minus replayed. Rows that a module cannot judge (shifts, standstill,
+//! rest) are masked by the measurement alone, never by the parameters.
+
+mod brake;
+mod force;
+mod lateral;
+mod powertrain;
+mod prepared;
+mod sensors;
+
+pub(crate) use prepared::Prepared;
+
+use crate::Plant;
+use crate::param::{P, PARAMS, Theta};
+
+/// A residual channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(usize)]
+pub enum Module {
+    /// Force balance over one second, m/s.
+    Force,
+    /// Engine torque response, percent of the reference torque.
+    Torque,
+    /// Brake pressure response, kPa.
+    Brake,
+    /// Duration of shifts, s.
+    Shift,
+    /// Fuel rate, g/s over its own noise scale.
+    Fuel,
+    /// Tractor yaw rate, rad/s.
+    Yaw,
+    /// Trailer yaw rate, rad/s.
+    TrailerYaw,
+    /// Lateral acceleration, m/s².
+    AccelY,
+    /// GPS speed against wheel speed, m/s.
+    Gps,
+    /// GPS altitude against the map, m.
+    Altitude,
+    /// Heading against the integrated yaw rate, rad.
+    Heading,
+    /// Longitudinal accelerometer against speed and grade, m/s over one second.
+    Imu,
+}
+
+/// Number of modules.
+pub(crate) const MODULES: usize = 12;
+
+use Module as M;
+
+impl Module {
+    /// All modules.
+    pub(crate) const ALL: [Self; MODULES] = [
+        M::Force,
+        M::Torque,
+        M::Brake,
+        M::Shift,
+        M::Fuel,
+        M::Yaw,
+        M::TrailerYaw,
+        M::AccelY,
+        M::Gps,
+        M::Altitude,
+        M::Heading,
+        M::Imu,
+    ];
+
+    /// The measured quantity that the module explains.
+    #[must_use]
+    pub fn quantity(self) -> &'static str {
+        match self {
+            M::Force => "speed_m_s",
+            M::Torque => "engine_torque_percent",
+            M::Brake => "brake_pressure_kpa",
+            M::Shift => "shift_in_process",
+            M::Fuel => "fuel_rate_g_s",
+            M::Yaw => "yaw_rate_rad_s",
+            M::TrailerYaw => "trailer_yaw_rate_rad_s",
+            M::AccelY => "accel_y_m_s2",
+            M::Gps => "gps_speed_m_s",
+            M::Altitude => "gps_altitude_m",
+            M::Heading => "heading_rad",
+            M::Imu => "accel_x_m_s2",
+        }
+    }
+
+    /// Time between two rows of the module, s.
+    pub(crate) fn row_step(self) -> usize {
+        match self {
+            M::Force | M::Altitude | M::Heading | M::Imu => 20,
+            M::Gps => 10,
+            M::Fuel => 4,
+            M::Shift => 1,
+            _ => 2,
+        }
+    }
+}
+
+/// Modules that are replayed together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(usize)]
+pub(crate) enum Group {
+    Force,
+    Torque,
+    Brake,
+    Shift,
+    Fuel,
+    Lateral,
+    Gps,
+    Altitude,
+    Heading,
+    Imu,
+}
+
+pub(crate) const GROUPS: [Group; 10] = [
+    Group::Force,
+    Group::Torque,
+    Group::Brake,
+    Group::Shift,
+    Group::Fuel,
+    Group::Lateral,
+    Group::Gps,
+    Group::Altitude,
+    Group::Heading,
+    Group::Imu,
+];
+
+impl Group {
+    pub(crate) fn modules(self) -> &'static [Module] {
+        match self {
+            Self::Force => &[M::Force],
+            Self::Torque => &[M::Torque],
+            Self::Brake => &[M::Brake],
+            Self::Shift => &[M::Shift],
+            Self::Fuel => &[M::Fuel],
+            Self::Lateral => &[M::Yaw, M::TrailerYaw, M::AccelY],
+            Self::Gps => &[M::Gps],
+            Self::Altitude => &[M::Altitude],
+            Self::Heading => &[M::Heading],
+            Self::Imu => &[M::Imu],
+        }
+    }
+}
+
+/// Groups whose residuals depend on a parameter.
+pub(crate) fn affects(p: P) -> &'static [Group] {
+    use Group as G;
+    match p {
+        P::Rolling
+        | P::Drag
+        | P::Headwind
+        | P::WarmupAmp
+        | P::WarmupTau
+        | P::DrivelineLoss
+        | P::FanPower
+        | P::FanStart
+        | P::DragBrake
+        | P::Friction
+        | P::BrakeGain
+        | P::Fade
+        | P::FadeStart
+        | P::RetarderStage
+        | P::RetarderBrake
+        | P::RetarderCoast
+        | P::TorqueScale
+        | P::EngineBrakeScale
+        | P::SpeedLag => &[G::Force],
+        P::WindX | P::WindY => &[G::Force, G::Lateral],
+        P::Mass => &[G::Force, G::Brake, G::Lateral],
+        P::GradeBias | P::MapShift => &[G::Force, G::Altitude, G::Imu],
+        P::Altitude
+        | P::AltitudeStart
+        | P::HeatAir
+        | P::HeatAirStart
+        | P::HeatCoolant
+        | P::HeatCoolantStart
+        | P::TurboLag
+        | P::PedalDelay
+        | P::TorqueReport => &[G::Torque],
+        P::ShiftTime => &[G::Shift],
+        P::FuelLow | P::FuelLowLoad | P::FuelScale | P::FuelLag => &[G::Fuel],
+        P::BrakeDelay => &[G::Brake],
+        P::SpeedScale => &[G::Force, G::Lateral, G::Gps, G::Altitude, G::Imu],
+        P::YawBias => &[G::Lateral, G::Heading],
+        P::SteerRatio
+        | P::SteerOffset
+        | P::FreePlay
+        | P::SteerLag
+        | P::CFront
+        | P::CDrive
+        | P::CTrailer
+        | P::PayloadX
+        | P::Bank
+        | P::Crosswind
+        | P::AccelYBias
+        | P::TrailerYawBias => &[G::Lateral],
+        P::GpsLag => &[G::Gps],
+        P::ImuBias => &[G::Imu],
+        P::AltitudeOffset => &[G::Altitude],
+        P::HeadingOffset => &[G::Heading],
+    }
+}
+
+/// Residuals of all modules of one drive; empty where a module is not available.
+pub(crate) type Residuals = [Vec<f64>; MODULES];
+
+/// Replays a group with a truck whose parameters are off by `theta` and writes its residuals.
+pub(crate) fn replay_group(d: &Prepared, plant: &Plant, t: &Theta, group: Group, out: &mut Residuals) {
+    debug_assert_eq!(t.len(), PARAMS);
+    if !group.modules().iter().any(|m| d.available[*m as usize]) {
+        return;
+    }
+    match group {
+        Group::Force => out[M::Force as usize] = force::residual(d, plant, t),
+        Group::Torque => out[M::Torque as usize] = powertrain::torque(d, plant, t),
+        Group::Brake => out[M::Brake as usize] = brake::residual(d, plant, t),
+        Group::Shift => out[M::Shift as usize] = powertrain::shift(d, plant, t),
+        Group::Fuel => out[M::Fuel as usize] = powertrain::fuel(d, plant, t),
+        Group::Lateral => {
+            let r = lateral::residuals(d, plant, t);
+            for (m, r) in group.modules().iter().zip(r) {
+                if d.available[*m as usize] {
+                    out[*m as usize] = r;
+                }
+            }
+        }
+        Group::Gps => out[M::Gps as usize] = sensors::gps(d, t),
+        Group::Altitude => out[M::Altitude as usize] = sensors::altitude(d, t),
+        Group::Heading => out[M::Heading as usize] = sensors::heading(d, t),
+        Group::Imu => out[M::Imu as usize] = sensors::imu(d, t),
+    }
+}

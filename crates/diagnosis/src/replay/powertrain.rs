@@ -1,0 +1,102 @@
+//! Engine torque from pedal and engine speed, shift durations, fuel from torque and speed.
+
+use tractrix_core::RPM_PER_RAD_S;
+
+use super::Module as M;
+use super::prepared::{Prepared, at_index};
+use crate::param::{P, Theta};
+use crate::{Drive, Plant};
+
+/// Torque response, percent of the reference torque, mean over two samples.
+pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
+    let valid = &d.valid[M::Torque as usize];
+    let delay = (plant.pedal_delay_s + t[P::PedalDelay as usize]) / Drive::STEP_S;
+    let boost_lag = (plant.torque_lag_s[0] + t[P::TurboLag as usize]).max(0.02);
+    let keep = |lag: f64| (-Drive::STEP_S / lag).exp();
+    let (slow, fast) = (keep(boost_lag), keep(plant.torque_lag_s[1]));
+    let percent = 100.0 / plant.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
+    let mut out = vec![0.0; valid.len()];
+    let mut torque = 0.0;
+    let mut running = false;
+    for (k, ok) in valid.iter().enumerate() {
+        if !ok {
+            running = false;
+            continue;
+        }
+        for i in 2 * k..2 * k + 2 {
+            if !running {
+                torque = d.torque[i] / percent;
+                running = true;
+            }
+            let n = d.rpm[i];
+            let full = plant.full_load_nm.at(n) * derate(d, t, i);
+            let friction = plant.friction_nm[0] + plant.friction_nm[1] * n;
+            let demand = at_index(&d.pedal, i as f64 - delay) * (full + friction);
+            let keep = if torque.min(demand) > plant.boost_from_frac * full { slow } else { fast };
+            torque = demand + (torque - demand) * keep;
+            out[k] += 0.5 * (d.torque[i] - torque.max(0.0) * percent);
+        }
+    }
+    out
+}
+
+/// Part of the full load that is left at this altitude, air and coolant temperature.
+#[inline]
+fn derate(d: &Prepared, t: &Theta, i: usize) -> f64 {
+    let mut left = 1.0;
+    let loss = |size: P, start: P, from: f64, unit: f64, x: f64| {
+        t[size as usize] * (x - from - t[start as usize]).max(0.0) / unit
+    };
+    if t[P::Altitude as usize] != 0.0 {
+        left -= loss(P::Altitude, P::AltitudeStart, 1500.0, 1e3, d.altitude[i]);
+    }
+    if t[P::HeatAir as usize] != 0.0 {
+        left -= loss(P::HeatAir, P::HeatAirStart, 30.0, 10.0, d.ambient[i]);
+    }
+    if t[P::HeatCoolant as usize] != 0.0 {
+        left -= loss(P::HeatCoolant, P::HeatCoolantStart, 98.0, 10.0, d.coolant[i]);
+    }
+    left.clamp(0.2, 1.5)
+}
+
+/// Measured minus expected duration of every shift, s.
+pub(super) fn shift(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
+    let expected = plant.shift_duration_s + t[P::ShiftTime as usize];
+    d.shifts.iter().map(|s| s.1 as f64 * Drive::STEP_S - expected).collect()
+}
+
+/// Fuel rate, over its noise scale (a constant part and one percent of the rate).
+pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
+    let valid = &d.valid[M::Fuel as usize];
+    let lag = t[P::FuelLag as usize] / Drive::STEP_S;
+    let [a, b, c] = plant.fuel;
+    let low_load = 0.3 * t[P::FuelLowLoad as usize].exp();
+    let low = t[P::FuelLow as usize];
+    valid
+        .iter()
+        .enumerate()
+        .map(|(k, ok)| {
+            if !ok {
+                return 0.0;
+            }
+            let (mut measured, mut modelled) = (0.0, 0.0);
+            for i in 4 * k..4 * k + 4 {
+                measured += 0.25 * d.fuel[i];
+                let x = i as f64 - lag;
+                let torque = at_index(&d.torque, x) * 0.01 * plant.reference_torque_nm;
+                if torque <= 0.0 {
+                    continue;
+                }
+                let n = at_index(&d.rpm, x);
+                let power_kw = torque * n / RPM_PER_RAD_S * 1e-3;
+                let mut rate = (a + b * n + c * power_kw) * (1.0 + t[P::FuelScale as usize]);
+                if low != 0.0 {
+                    let load = torque / plant.full_load_nm.at(n).max(1.0);
+                    rate *= 1.0 + low * (1.0 - load / low_load).max(0.0);
+                }
+                modelled += 0.25 * rate;
+            }
+            (measured - modelled) / (0.03 + 0.01 * measured)
+        })
+        .collect()
+}

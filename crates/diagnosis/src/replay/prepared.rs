@@ -1,0 +1,321 @@
+//! A drive made ready for replay: channels with defaults, air density, masks per module.
+
+use tractrix_core::{GAS_CONSTANT_AIR_J_KG_K, GRAVITY_M_S2};
+
+use super::{MODULES, Module as M};
+use crate::{Channel as C, Drive, Plant};
+
+/// A drive with everything that does not depend on the parameters.
+pub(crate) struct Prepared {
+    pub(crate) name: String,
+    pub(crate) n: usize,
+    pub(crate) mass_kg: f64,
+    pub(crate) warm: bool,
+    pub(crate) speed: Vec<f64>,
+    pub(crate) gps: Vec<f64>,
+    pub(crate) altitude: Vec<f64>,
+    pub(crate) heading: Vec<f64>,
+    pub(crate) accel_x: Vec<f64>,
+    pub(crate) pedal: Vec<f64>,
+    pub(crate) torque: Vec<f64>,
+    pub(crate) rpm: Vec<f64>,
+    pub(crate) gear: Vec<usize>,
+    pub(crate) engine_brake: Vec<f64>,
+    pub(crate) xbr: Vec<f64>,
+    pub(crate) pressure: Vec<f64>,
+    pub(crate) steer: Vec<f64>,
+    pub(crate) yaw: Vec<f64>,
+    pub(crate) trailer_yaw: Vec<f64>,
+    pub(crate) accel_y: Vec<f64>,
+    pub(crate) fuel: Vec<f64>,
+    pub(crate) coolant: Vec<f64>,
+    pub(crate) ambient: Vec<f64>,
+    pub(crate) density: Vec<f64>,
+    pub(crate) grade: Vec<f64>,
+    pub(crate) curvature: Vec<f64>,
+    pub(crate) s_map: Vec<f64>,
+    pub(crate) grade_by_s: GradeBySection,
+    /// Closed driveline without a shift near, per sample.
+    pub(crate) engaged: Vec<bool>,
+    /// Shifts as (first sample, number of samples).
+    pub(crate) shifts: Vec<(usize, usize)>,
+    /// Rows that count, per module.
+    pub(crate) valid: [Vec<bool>; MODULES],
+    pub(crate) available: [bool; MODULES],
+    pub(crate) has: Vec<C>,
+}
+
+/// Grade over the position, on a uniform grid.
+pub(crate) struct GradeBySection {
+    start_m: f64,
+    values: Vec<f64>,
+}
+
+const SECTION_M: f64 = 4.0;
+
+impl GradeBySection {
+    fn new(s: &[f64], grade: &[f64]) -> Self {
+        let (lo, hi) = s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, x| {
+            (a.0.min(*x), a.1.max(*x))
+        });
+        let cells = (((hi - lo) / SECTION_M) as usize + 2).min(1_000_000);
+        let (mut sum, mut count) = (vec![0.0; cells], vec![0.0; cells]);
+        for (s, g) in s.iter().zip(grade) {
+            let i = (((s - lo) / SECTION_M) as usize).min(cells - 1);
+            sum[i] += g;
+            count[i] += 1.0;
+        }
+        let mut last = grade.first().copied().unwrap_or(0.0);
+        let values = sum
+            .iter()
+            .zip(&count)
+            .map(|(s, c)| {
+                if *c > 0.0 {
+                    last = s / c;
+                }
+                last
+            })
+            .collect();
+        Self { start_m: lo, values }
+    }
+
+    pub(crate) fn at(&self, s_m: f64) -> f64 {
+        let x = ((s_m - self.start_m) / SECTION_M - 0.5).max(0.0);
+        let i = (x as usize).min(self.values.len() - 1);
+        let j = (i + 1).min(self.values.len() - 1);
+        self.values[i] + (x - i as f64).min(1.0) * (self.values[j] - self.values[i])
+    }
+}
+
+/// Samples kept away from a shift on either side.
+const SHIFT_MARGIN: usize = 12;
+
+impl Prepared {
+    pub(crate) fn new(drive: &Drive, plant: &Plant) -> Self {
+        let n = drive.len;
+        let get = |c: C, default: f64| drive.get(c).map_or_else(|| vec![default; n], <[f64]>::to_vec);
+        let has: Vec<C> = C::all().filter(|c| drive.has(*c)).collect();
+        let speed = get(C::SpeedMS, 0.0);
+        let s_map = drive.get(C::SMapM).map_or_else(
+            || {
+                let mut s = 0.0;
+                speed.iter().map(|v| { s += v * Drive::STEP_S; s }).collect()
+            },
+            <[f64]>::to_vec,
+        );
+        let grade = get(C::GradeFrac, 0.0);
+        let ambient = get(C::AmbientTempDegc, 15.0);
+        let density = get(C::BaroPressurePa, 101_325.0)
+            .iter()
+            .zip(&ambient)
+            .map(|(p, t)| p / (GAS_CONSTANT_AIR_J_KG_K * (t + 273.15)))
+            .collect();
+        let rpm = get(C::EngineSpeedRpm, plant.idle_speed_rpm);
+        let gear: Vec<usize> = get(C::Gear, 0.0).iter().map(|g| g.max(0.0) as usize).collect();
+        let shifting: Vec<bool> = get(C::ShiftInProcess, 0.0).iter().map(|s| *s > 0.5).collect();
+        let shifts = runs(&shifting);
+        let engaged = engaged(plant, &speed, &rpm, &gear, &shifting);
+        let mut heading = get(C::HeadingRad, 0.0);
+        unwrap(&mut heading);
+        let mut d = Self {
+            name: drive.name.clone(),
+            n,
+            mass_kg: drive.reported_mass_kg.unwrap_or(plant.mass_kg),
+            warm: drive.tyres_warm_at_start.unwrap_or(true),
+            gps: get(C::GpsSpeedMS, 0.0),
+            altitude: get(C::GpsAltitudeM, 0.0),
+            heading,
+            accel_x: get(C::AccelXMS2, 0.0),
+            pedal: get(C::AcceleratorPedalFrac, 0.0),
+            torque: get(C::EngineTorquePercent, 0.0),
+            engine_brake: get(C::EngineBrakeFrac, 0.0),
+            xbr: get(C::XbrDecelMS2, 0.0),
+            pressure: get(C::BrakePressureKpa, 0.0),
+            steer: get(C::SteeringWheelRad, 0.0),
+            yaw: get(C::YawRateRadS, 0.0),
+            trailer_yaw: get(C::TrailerYawRateRadS, 0.0),
+            accel_y: get(C::AccelYMS2, 0.0),
+            fuel: get(C::FuelRateGS, 0.0),
+            coolant: get(C::CoolantTempDegc, 80.0),
+            curvature: get(C::Curvature1M, 0.0),
+            grade_by_s: GradeBySection::new(&s_map, &grade),
+            speed,
+            rpm,
+            gear,
+            ambient,
+            density,
+            grade,
+            s_map,
+            engaged,
+            shifts,
+            valid: Default::default(),
+            available: [false; MODULES],
+            has,
+        };
+        d.mask(plant);
+        d
+    }
+
+    pub(crate) fn has(&self, channels: &[C]) -> bool {
+        channels.iter().all(|c| self.has.contains(c))
+    }
+
+    /// Gravity's component along the road per metre of grade error, m/s².
+    pub(crate) fn gravity_along(grade_frac: f64) -> f64 {
+        GRAVITY_M_S2 * grade_frac / (1.0 + grade_frac * grade_frac).sqrt()
+    }
+
+    fn mask(&mut self, plant: &Plant) {
+        let n = self.n;
+        let rows = |m: M, ok: &dyn Fn(usize, usize) -> bool| -> Vec<bool> {
+            let step = m.row_step();
+            (0..(n / step).saturating_sub(2)).map(|k| ok(k * step, (k + 1) * step)).collect()
+        };
+        let seconds = |m: M, ok: &dyn Fn(usize) -> bool| {
+            rows(m, &|a, b| (a..(b + 4).min(n)).all(ok))
+        };
+        let mut valid: [Vec<bool>; MODULES] = Default::default();
+        let longitudinal = self.has(&[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear])
+            && self.has(&[C::GradeFrac]);
+        if longitudinal {
+            valid[M::Force as usize] =
+                seconds(M::Force, &|i| self.engaged[i] && self.speed[i] > 3.0);
+        }
+        if self.has(&[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm]) {
+            let idle = plant.idle_speed_rpm + 80.0;
+            valid[M::Torque as usize] = rows(M::Torque, &|a, b| {
+                (a..b).all(|i| self.engaged[i] && self.rpm[i] > idle && self.speed[i] > 3.0)
+            });
+        }
+        if self.has(&[C::XbrDecelMS2, C::BrakePressureKpa]) {
+            let active: Vec<bool> = (0..n)
+                .map(|i| {
+                    let from = i.saturating_sub(30);
+                    (from..=i).any(|j| self.xbr[j] > 0.0 || self.pressure[j] > 0.0)
+                })
+                .collect();
+            valid[M::Brake as usize] = rows(M::Brake, &|a, b| (a..b).all(|i| active[i]));
+        }
+        if self.has(&[C::ShiftInProcess]) {
+            valid[M::Shift as usize] = vec![true; self.shifts.len()];
+        }
+        if self.has(&[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm]) {
+            valid[M::Fuel as usize] = rows(M::Fuel, &|a, b| {
+                (a..b).all(|i| self.engaged[i] && self.speed[i] > 3.0)
+            });
+        }
+        if self.has(&[C::SteeringWheelRad]) {
+            let moving: Vec<bool> = {
+                let mut since = 0;
+                self.speed
+                    .iter()
+                    .map(|v| {
+                        since = if *v > 5.0 { since + 1 } else { 0 };
+                        since > 80
+                    })
+                    .collect()
+            };
+            for (m, c) in [
+                (M::Yaw, C::YawRateRadS),
+                (M::TrailerYaw, C::TrailerYawRateRadS),
+                (M::AccelY, C::AccelYMS2),
+            ] {
+                if self.has(&[c]) {
+                    valid[m as usize] = rows(m, &|a, b| (a..b).all(|i| moving[i]));
+                }
+            }
+        }
+        if self.has(&[C::GpsSpeedMS]) {
+            valid[M::Gps as usize] =
+                rows(M::Gps, &|a, b| (a..b).all(|i| self.speed[i] > 2.0));
+        }
+        if self.has(&[C::GpsAltitudeM, C::GradeFrac]) {
+            valid[M::Altitude as usize] = rows(M::Altitude, &|_, _| true);
+        }
+        if self.has(&[C::HeadingRad, C::YawRateRadS]) {
+            valid[M::Heading as usize] = rows(M::Heading, &|_, _| true);
+        }
+        if self.has(&[C::AccelXMS2, C::GradeFrac]) {
+            valid[M::Imu as usize] = seconds(M::Imu, &|i| self.speed[i] > 3.0);
+        }
+        for (a, v) in self.available.iter_mut().zip(&valid) {
+            *a = v.iter().filter(|x| **x).count() >= 8;
+        }
+        self.valid = valid;
+    }
+}
+
+fn runs(on: &[bool]) -> Vec<(usize, usize)> {
+    let mut out = Vec::new();
+    let mut start = None;
+    for (i, s) in on.iter().enumerate() {
+        match (s, start) {
+            (true, None) => start = Some(i),
+            (false, Some(a)) => {
+                out.push((a, i - a));
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    out
+}
+
+/// In gear, clutch closed (engine speed fits the gear), no shift within the margin.
+fn engaged(plant: &Plant, speed: &[f64], rpm: &[f64], gear: &[usize], shifting: &[bool]) -> Vec<bool> {
+    let n = speed.len();
+    let mut near = vec![false; n];
+    for i in 0..n {
+        if shifting[i] || (i > 0 && gear[i] != gear[i - 1]) {
+            let (a, b) = (i.saturating_sub(SHIFT_MARGIN), (i + SHIFT_MARGIN).min(n - 1));
+            near[a..=b].fill(true);
+        }
+    }
+    (0..n)
+        .map(|i| {
+            let Some(ratio) = gear[i].checked_sub(1).and_then(|g| plant.gear_ratios.get(g)) else {
+                return false;
+            };
+            let expected = speed[i] / plant.wheel_radius_m
+                * ratio
+                * plant.final_drive_ratio
+                * tractrix_core::RPM_PER_RAD_S;
+            !near[i] && (rpm[i] - expected).abs() < 60.0 + 0.08 * expected
+        })
+        .collect()
+}
+
+fn unwrap(angle: &mut [f64]) {
+    let turn = 2.0 * core::f64::consts::PI;
+    let mut add = 0.0;
+    for i in 1..angle.len() {
+        let raw = angle[i] + add;
+        let jump = raw - angle[i - 1];
+        add -= (jump / turn).round() * turn;
+        angle[i] += add;
+    }
+}
+
+/// Linear interpolation at a fractional index, held at the ends.
+#[inline]
+pub(super) fn at_index(x: &[f64], index: f64) -> f64 {
+    if index <= 0.0 {
+        return x[0];
+    }
+    let i = index as usize;
+    if i + 1 >= x.len() {
+        return x[x.len() - 1];
+    }
+    x[i] + (index - i as f64) * (x[i + 1] - x[i])
+}
+
+/// Running sum with a leading zero: `sum[j] - sum[i]` is the sum over `i..j`.
+pub(super) fn running_sum(x: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut sum = 0.0;
+    core::iter::once(0.0)
+        .chain(x.map(|v| {
+            sum += v;
+            sum
+        }))
+        .collect()
+}
