@@ -33,7 +33,7 @@ pub enum Channel {
 }
 
 /// Number of channels.
-pub const CHANNELS: usize = 24;
+pub(crate) const CHANNELS: usize = 24;
 
 struct Spec(Channel, &'static str, f64, f64);
 
@@ -110,8 +110,6 @@ impl Channel {
                 | C::YawRateRadS
                 | C::TrailerYawRateRadS
                 | C::EngineSpeedRpm
-                | C::EngineTorquePercent
-                | C::FuelRateGS
                 | C::SMapM
         )
     }

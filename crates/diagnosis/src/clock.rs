@@ -22,11 +22,11 @@ pub fn lag_samples(x: &[f64], y: &[f64], max_lag: usize) -> Option<f64> {
     let m = dx.len();
     let correlation = |lag: i64| {
         let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
-        for i in max_lag..m - max_lag {
-            let j = (i as i64 - lag) as usize;
-            xy += dx[i] * dy[j];
-            xx += dx[i] * dx[i];
-            yy += dy[j] * dy[j];
+        let from = (max_lag as i64 - lag) as usize;
+        for (x, y) in dx[max_lag..m - max_lag].iter().zip(&dy[from..]) {
+            xy += x * y;
+            xx += x * x;
+            yy += y * y;
         }
         if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 }
     };

@@ -4,19 +4,35 @@
 
 mod channel;
 pub mod clock;
+mod diagnosis;
 mod drive;
 mod error;
+mod executor;
+mod finding;
+mod gain;
+mod hypothesis;
 mod param;
 mod plant;
 mod plant_reference;
-mod replay;
-mod finding;
+mod plausible;
+mod problem;
 mod read;
+mod replay;
+mod search;
+mod sentence;
+mod stats;
+mod unknown;
 
 pub use channel::Channel;
+pub use diagnosis::{
+    BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Options, Parameter, Progress,
+    Unknown, Verdict, Wrong, diagnose,
+};
 pub use drive::{Drive, DriveSet, RoadMap};
 pub use error::DiagnosisError;
+pub use executor::{Executor, Serial};
 pub use finding::{Action, Finding, FindingKind};
+pub use hypothesis::CauseKind;
 pub use plant::Plant;
-pub use replay::Module;
 pub use read::{RawTable, read_drives, read_table};
+pub use replay::Module;

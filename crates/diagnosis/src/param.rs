@@ -123,10 +123,17 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::AltitudeStart, "start_offset_m", "m", (600.0, -1500.0, 1200.0, 100.0), 0.0, 0.0),
     s(P::HeatAir, "torque_loss_per_10_k_air", "1/(10 K)", (0.06, -0.02, 0.5, 0.02), 0.0, 0.0),
     s(P::HeatAirStart, "air_start_offset_k", "K", (6.0, -20.0, 12.0, 1.0), 0.0, 0.0),
-    s(P::HeatCoolant, "torque_loss_per_10_k_coolant", "1/(10 K)", (0.1, -0.02, 0.6, 0.03), 0.0, 0.0),
+    s(
+        P::HeatCoolant,
+        "torque_loss_per_10_k_coolant",
+        "1/(10 K)",
+        (0.1, -0.02, 0.6, 0.03),
+        0.0,
+        0.0,
+    ),
     s(P::HeatCoolantStart, "coolant_start_offset_k", "K", (5.0, -14.0, 14.0, 1.0), 0.0, 0.0),
-    s(P::TurboLag, "lag_s", "s", (0.4, -0.4, 4.0, 0.1), 0.01, 0.05),
-    s(P::PedalDelay, "delay_s", "s", (0.2, -0.1, 1.5, 0.05), 0.004, 0.05),
+    s(P::TurboLag, "lag_s", "s", (0.4, -0.4, 4.0, 0.05), 0.01, 0.0),
+    s(P::PedalDelay, "delay_s", "s", (0.2, -0.1, 1.5, 0.05), 0.004, 0.03),
     s(P::ShiftTime, "extra_time_s", "s", (0.4, -0.8, 3.0, 0.1), 0.01, 0.05),
     s(P::FuelLow, "extra_frac", "1", (0.2, -0.6, 2.0, 0.05), 0.0, 0.0),
     s(P::FuelLowLoad, "ln_load", "1", (0.35, -1.0, 1.0, 0.2), 0.0, 0.0),
@@ -160,7 +167,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::EngineBrakeScale, "scale", "1", (0.1, -0.6, 1.0, 0.05), 0.015, 0.0),
     s(P::SpeedLag, "lag_s", "s", (0.1, -1.0, 1.0, 0.02), 0.004, 0.05),
     s(P::FuelLag, "lag_s", "s", (0.1, -0.3, 2.0, 0.02), 0.004, 0.05),
-    s(P::TorqueReport, "scale", "1", (0.05, -0.3, 0.3, 0.01), 0.003, 0.01),
+    s(P::TorqueReport, "scale", "1", (0.05, -0.3, 0.3, 0.01), 0.002, 0.0),
 ];
 
 impl P {

@@ -4,7 +4,7 @@ use dynamics::lateral::{
     LateralParameters, LoadTransferParameters, PayloadParameters, SteeringParameters,
     TractorParameters, TrailerParameters, TyreLaw, TyreParameters,
 };
-use tractrix_core::{Curve, CoreError};
+use tractrix_core::{CoreError, Curve};
 
 use crate::Plant;
 
@@ -19,8 +19,8 @@ impl Plant {
             1950.0, 2100.0,
         ];
         let nm = [
-            1400.0, 1700.0, 2002.0, 2295.0, 2586.0, 2600.0, 2600.0, 2568.0, 2457.0, 2313.0,
-            2185.0, 1700.0, 0.0,
+            1400.0, 1700.0, 2002.0, 2295.0, 2586.0, 2600.0, 2600.0, 2568.0, 2457.0, 2313.0, 2185.0,
+            1700.0, 0.0,
         ];
         Ok(Self {
             name: "reference".to_owned(),

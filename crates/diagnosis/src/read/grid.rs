@@ -77,7 +77,11 @@ pub(super) fn to_grid(
 type Note<'a> = dyn FnMut(Option<&str>, Option<f64>, FindingKind, Action) + 'a;
 
 /// Rows with finite, increasing time.
-fn usable_rows(name: &str, time: &[f64], note: &mut Note<'_>) -> Result<Vec<usize>, DiagnosisError> {
+fn usable_rows(
+    name: &str,
+    time: &[f64],
+    note: &mut Note<'_>,
+) -> Result<Vec<usize>, DiagnosisError> {
     let (mut keep, mut bad, mut twice) = (Vec::with_capacity(time.len()), 0, 0);
     let (mut first_bad, mut first_twice) = (None, None);
     let mut last = f64::NEG_INFINITY;
@@ -186,9 +190,7 @@ fn unit_error(channel: Channel, v: &[f64], largest: f64) -> Option<(&'static str
         Channel::YawRateRadS | Channel::TrailerYawRateRadS if largest > 4.0 => {
             Some(("deg/s", core::f64::consts::PI / 180.0))
         }
-        Channel::SteeringWheelRad if largest > 40.0 => {
-            Some(("deg", core::f64::consts::PI / 180.0))
-        }
+        Channel::SteeringWheelRad if largest > 40.0 => Some(("deg", core::f64::consts::PI / 180.0)),
         _ => None,
     }
 }
@@ -275,11 +277,7 @@ fn stuck(drive: &mut Drive, speed: &[f64], note: &mut Note<'_>) {
         let Some(v) = drive.get(channel) else { continue };
         let (mut from, mut longest, mut at, mut total) = (0, 0, 0, 0);
         for i in 1..=v.len() {
-            let still = i < v.len()
-                && v[i] == v[i - 1]
-                && speed[i] > 5.0
-                && !(channel == Channel::FuelRateGS || channel == Channel::EngineTorquePercent)
-                    | (i < v.len() && v[i] != 0.0);
+            let still = i < v.len() && v[i] == v[i - 1] && speed[i] > 5.0;
             if still {
                 continue;
             }
@@ -315,8 +313,7 @@ pub(super) fn fill_from_map(drive: &mut Drive) {
         [(Channel::GradeFrac, &map.grade_frac), (Channel::Curvature1M, &map.curvature_1_m)]
     {
         if !drive.has(channel)
-            && let Ok(curve) =
-                tractrix_core::Curve::new(channel.name(), map.s_m.clone(), y.clone())
+            && let Ok(curve) = tractrix_core::Curve::new(channel.name(), map.s_m.clone(), y.clone())
         {
             let v = s.iter().map(|s| curve.at(*s)).collect();
             drive.set(channel, v);

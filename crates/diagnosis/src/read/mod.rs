@@ -110,7 +110,9 @@ fn road_map(path: &Path) -> Result<RoadMap, DiagnosisError> {
     let grade_frac = need("grade_frac")?;
     let curvature_1_m =
         t.column("curvature_1_m").map_or_else(|| vec![0.0; s_m.len()], <[f64]>::to_vec);
-    if s_m.len() < 2 || s_m.windows(2).any(|w| !(w[1] > w[0])) {
+    if s_m.len() < 2
+        || s_m.windows(2).any(|w| w[1] <= w[0] || !w[0].is_finite() || !w[1].is_finite())
+    {
         return Err(bad("s_m must increase and have two rows at least".into()));
     }
     if grade_frac.iter().chain(&curvature_1_m).any(|v| !v.is_finite()) {

@@ -70,8 +70,7 @@ where
     let (mut raw, mut defs) = (Vec::new(), Vec::new());
     let mut read = 0;
     while read < rows {
-        let (records, _, _) =
-            reader.read_records(rows - read, Some(&mut defs), None, &mut raw)?;
+        let (records, _, _) = reader.read_records(rows - read, Some(&mut defs), None, &mut raw)?;
         if records == 0 {
             break;
         }
@@ -81,9 +80,11 @@ where
         out.extend(raw.into_iter().map(f));
     } else {
         let mut present = raw.into_iter();
-        out.extend(defs.iter().map(|&d| {
-            if d == max_def { present.next().map_or(f64::NAN, &f) } else { f64::NAN }
-        }));
+        out.extend(
+            defs.iter().map(|&d| {
+                if d == max_def { present.next().map_or(f64::NAN, &f) } else { f64::NAN }
+            }),
+        );
     }
     Ok(())
 }

@@ -1,4 +1,5 @@
-//! Brake pressure from the deceleration demand: dead time, first-order lag, rate limits.
+//! Brake pressure from the deceleration demand: dead time, first-order lag, rate limits. The brake
+//! controller scales its demand with the reported mass.
 
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
@@ -9,7 +10,7 @@ use crate::{Drive, Plant};
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Brake as usize];
     let delay = (plant.brake_delay_s + t[P::BrakeDelay as usize]) / Drive::STEP_S;
-    let gain = d.mass_kg * (1.0 + t[P::Mass as usize]) / plant.brake_gain_n_kpa;
+    let gain = d.mass_kg / plant.brake_gain_n_kpa;
     let keep = (-Drive::STEP_S / plant.brake_lag_s).exp();
     let (up, down) =
         (plant.brake_rate_kpa_s[0] * Drive::STEP_S, plant.brake_rate_kpa_s[1] * Drive::STEP_S);

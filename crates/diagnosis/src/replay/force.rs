@@ -21,7 +21,13 @@ pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
 }
 
 /// Measured change of the quantity over a second minus the change of `sum`.
-pub(super) fn weak_form(valid: &[bool], speed: &[f64], scale: f64, sum: &[f64], lag: f64) -> Vec<f64> {
+pub(super) fn weak_form(
+    valid: &[bool],
+    speed: &[f64],
+    scale: f64,
+    sum: &[f64],
+    lag: f64,
+) -> Vec<f64> {
     let edge = |x: &[f64], i: usize, shift: f64| {
         (0..EDGE).map(|j| at_index(x, (i + j) as f64 - shift)).sum::<f64>() / EDGE as f64
     };
@@ -40,7 +46,12 @@ pub(super) fn weak_form(valid: &[bool], speed: &[f64], scale: f64, sum: &[f64], 
 }
 
 /// Modelled acceleration of every sample, m/s². With `only`, samples outside it are left at zero.
-pub(crate) fn acceleration(d: &Prepared, plant: &Plant, t: &Theta, speed: Option<&[f64]>) -> Vec<f64> {
+pub(crate) fn acceleration(
+    d: &Prepared,
+    plant: &Plant,
+    t: &Theta,
+    speed: Option<&[f64]>,
+) -> Vec<f64> {
     let model = Longitudinal::new(d, plant, t);
     let mut brake_k = 0.0;
     let scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
@@ -132,8 +143,8 @@ impl<'a> Longitudinal<'a> {
             + if coasting { t[P::RetarderCoast as usize] } else { 0.0 })
             * per_prop
             + t[P::RetarderBrake as usize] * d.xbr[i];
-        let force = drive - self.air(i, v) - resistance - service - retarder
-            - t[P::DragBrake as usize];
+        let force =
+            drive - self.air(i, v) - resistance - service - retarder - t[P::DragBrake as usize];
         force / inertia
     }
 
@@ -151,7 +162,8 @@ impl<'a> Longitudinal<'a> {
     fn air(&self, i: usize, v: f64) -> f64 {
         let (along, across) = air_speed(self.d, self.t, self.wind, i, v);
         let speed2 = along * along + across * across;
-        let yaw = if across == 0.0 { 0.0 } else { (across / along.abs().max(1.0)).atan().to_degrees() };
+        let yaw =
+            if across == 0.0 { 0.0 } else { (across / along.abs().max(1.0)).atan().to_degrees() };
         0.5 * self.d.density[i]
             * self.cd_a
             * (1.0 + self.plant.drag_yaw_frac_per_deg * yaw.abs())

@@ -22,6 +22,14 @@ pub(crate) fn loaded(d: &Prepared, plant: &Plant, t: &Theta) -> LateralParameter
     p
 }
 
+/// Axle stiffness at the loads of the load sheet, N/rad.
+fn by_load_sheet(d: &Prepared, plant: &Plant, t: &Theta) -> [f64; dynamics::lateral::AXLES] {
+    let mut sheet = *t;
+    sheet[P::Mass as usize] = 0.0;
+    let p = loaded(d, plant, &sheet);
+    p.tyres.stiffness_n_rad(&p.static_axle_load_n())
+}
+
 /// `A(v) = constant + inverse / v + linear v`, exactly.
 struct BySpeed {
     constant: [[f64; 4]; 4],
@@ -72,6 +80,7 @@ impl BySpeed {
 pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3] {
     let p = loaded(d, plant, t);
     let mut model = YawSideslip::new(&p);
+    model.stiffness_n_rad = by_load_sheet(d, plant, t);
     let scale = [t[P::CFront as usize], t[P::CDrive as usize], t[P::CTrailer as usize]];
     for (axle, c) in model.stiffness_n_rad.iter_mut().enumerate() {
         *c *= 1.0 + scale[[0, 1, 1, 2, 2, 2][axle]];

@@ -6,7 +6,7 @@
 //! rest) are masked by the measurement alone, never by the parameters.
 
 mod brake;
-mod force;
+pub(crate) mod force;
 mod lateral;
 mod powertrain;
 mod prepared;
@@ -170,7 +170,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::EngineBrakeScale
         | P::SpeedLag => &[G::Force],
         P::WindX | P::WindY => &[G::Force, G::Lateral],
-        P::Mass => &[G::Force, G::Brake, G::Lateral],
+        P::Mass => &[G::Force, G::Lateral],
         P::GradeBias | P::MapShift => &[G::Force, G::Altitude, G::Imu],
         P::Altitude
         | P::AltitudeStart
@@ -209,7 +209,13 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
 pub(crate) type Residuals = [Vec<f64>; MODULES];
 
 /// Replays a group with a truck whose parameters are off by `theta` and writes its residuals.
-pub(crate) fn replay_group(d: &Prepared, plant: &Plant, t: &Theta, group: Group, out: &mut Residuals) {
+pub(crate) fn replay_group(
+    d: &Prepared,
+    plant: &Plant,
+    t: &Theta,
+    group: Group,
+    out: &mut Residuals,
+) {
     debug_assert_eq!(t.len(), PARAMS);
     if !group.modules().iter().any(|m| d.available[*m as usize]) {
         return;

@@ -32,7 +32,8 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
             let full = plant.full_load_nm.at(n) * derate(d, t, i);
             let friction = plant.friction_nm[0] + plant.friction_nm[1] * n;
             let demand = at_index(&d.pedal, i as f64 - delay) * (full + friction);
-            let keep = if torque.min(demand) > plant.boost_from_frac * full { slow } else { fast };
+            let boosting = demand > torque && torque > plant.boost_from_frac * full;
+            let keep = if boosting { slow } else { fast };
             torque = demand + (torque - demand) * keep;
             out[k] += 0.5 * (d.torque[i] - torque.max(0.0) * percent);
         }
@@ -84,9 +85,7 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 measured += 0.25 * d.fuel[i];
                 let x = i as f64 - lag;
                 let torque = at_index(&d.torque, x) * 0.01 * plant.reference_torque_nm;
-                if torque <= 0.0 {
-                    continue;
-                }
+                let torque = torque.max(0.0);
                 let n = at_index(&d.rpm, x);
                 let power_kw = torque * n / RPM_PER_RAD_S * 1e-3;
                 let mut rate = (a + b * n + c * power_kw) * (1.0 + t[P::FuelScale as usize]);

@@ -55,9 +55,8 @@ const SECTION_M: f64 = 4.0;
 
 impl GradeBySection {
     fn new(s: &[f64], grade: &[f64]) -> Self {
-        let (lo, hi) = s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, x| {
-            (a.0.min(*x), a.1.max(*x))
-        });
+        let (lo, hi) =
+            s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, x| (a.0.min(*x), a.1.max(*x)));
         let cells = (((hi - lo) / SECTION_M) as usize + 2).min(1_000_000);
         let (mut sum, mut count) = (vec![0.0; cells], vec![0.0; cells]);
         for (s, g) in s.iter().zip(grade) {
@@ -93,13 +92,20 @@ const SHIFT_MARGIN: usize = 12;
 impl Prepared {
     pub(crate) fn new(drive: &Drive, plant: &Plant) -> Self {
         let n = drive.len;
-        let get = |c: C, default: f64| drive.get(c).map_or_else(|| vec![default; n], <[f64]>::to_vec);
+        let get =
+            |c: C, default: f64| drive.get(c).map_or_else(|| vec![default; n], <[f64]>::to_vec);
         let has: Vec<C> = C::all().filter(|c| drive.has(*c)).collect();
         let speed = get(C::SpeedMS, 0.0);
         let s_map = drive.get(C::SMapM).map_or_else(
             || {
                 let mut s = 0.0;
-                speed.iter().map(|v| { s += v * Drive::STEP_S; s }).collect()
+                speed
+                    .iter()
+                    .map(|v| {
+                        s += v * Drive::STEP_S;
+                        s
+                    })
+                    .collect()
             },
             <[f64]>::to_vec,
         );
@@ -156,6 +162,24 @@ impl Prepared {
         d
     }
 
+    /// The measured signal that a module explains; empty for shifts, which are events.
+    pub(crate) fn measured(&self, m: M) -> &[f64] {
+        match m {
+            M::Force => &self.speed,
+            M::Torque => &self.torque,
+            M::Brake => &self.pressure,
+            M::Shift => &[],
+            M::Fuel => &self.fuel,
+            M::Yaw => &self.yaw,
+            M::TrailerYaw => &self.trailer_yaw,
+            M::AccelY => &self.accel_y,
+            M::Gps => &self.gps,
+            M::Altitude => &self.altitude,
+            M::Heading => &self.heading,
+            M::Imu => &self.accel_x,
+        }
+    }
+
     pub(crate) fn has(&self, channels: &[C]) -> bool {
         channels.iter().all(|c| self.has.contains(c))
     }
@@ -171,9 +195,8 @@ impl Prepared {
             let step = m.row_step();
             (0..(n / step).saturating_sub(2)).map(|k| ok(k * step, (k + 1) * step)).collect()
         };
-        let seconds = |m: M, ok: &dyn Fn(usize) -> bool| {
-            rows(m, &|a, b| (a..(b + 4).min(n)).all(ok))
-        };
+        let seconds =
+            |m: M, ok: &dyn Fn(usize) -> bool| rows(m, &|a, b| (a..(b + 4).min(n)).all(ok));
         let mut valid: [Vec<bool>; MODULES] = Default::default();
         let longitudinal = self.has(&[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear])
             && self.has(&[C::GradeFrac]);
@@ -200,9 +223,8 @@ impl Prepared {
             valid[M::Shift as usize] = vec![true; self.shifts.len()];
         }
         if self.has(&[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm]) {
-            valid[M::Fuel as usize] = rows(M::Fuel, &|a, b| {
-                (a..b).all(|i| self.engaged[i] && self.speed[i] > 3.0)
-            });
+            valid[M::Fuel as usize] =
+                rows(M::Fuel, &|a, b| (a..b).all(|i| self.engaged[i] && self.speed[i] > 3.0));
         }
         if self.has(&[C::SteeringWheelRad]) {
             let moving: Vec<bool> = {
@@ -226,8 +248,7 @@ impl Prepared {
             }
         }
         if self.has(&[C::GpsSpeedMS]) {
-            valid[M::Gps as usize] =
-                rows(M::Gps, &|a, b| (a..b).all(|i| self.speed[i] > 2.0));
+            valid[M::Gps as usize] = rows(M::Gps, &|a, b| (a..b).all(|i| self.speed[i] > 2.0));
         }
         if self.has(&[C::GpsAltitudeM, C::GradeFrac]) {
             valid[M::Altitude as usize] = rows(M::Altitude, &|_, _| true);
@@ -262,7 +283,13 @@ fn runs(on: &[bool]) -> Vec<(usize, usize)> {
 }
 
 /// In gear, clutch closed (engine speed fits the gear), no shift within the margin.
-fn engaged(plant: &Plant, speed: &[f64], rpm: &[f64], gear: &[usize], shifting: &[bool]) -> Vec<bool> {
+fn engaged(
+    plant: &Plant,
+    speed: &[f64],
+    rpm: &[f64],
+    gear: &[usize],
+    shifting: &[bool],
+) -> Vec<bool> {
     let n = speed.len();
     let mut near = vec![false; n];
     for i in 0..n {

@@ -22,11 +22,8 @@ pub(super) fn altitude(d: &Prepared, t: &Theta) -> Vec<f64> {
     let scale = Drive::STEP_S / (1.0 + t[P::SpeedScale as usize]);
     let shift = t[P::MapShift as usize];
     let climb = running_sum((0..d.n).map(|i| {
-        let grade = if shift == 0.0 {
-            d.grade[i]
-        } else {
-            d.grade_by_s.at(d.s_map[i] + shift)
-        } + t[P::GradeBias as usize];
+        let grade = if shift == 0.0 { d.grade[i] } else { d.grade_by_s.at(d.s_map[i] + shift) }
+            + t[P::GradeBias as usize];
         grade / (1.0 + grade * grade).sqrt() * d.speed[i] * scale
     }));
     let start = d.altitude.iter().take(20).sum::<f64>() / d.altitude.len().min(20) as f64;
@@ -51,11 +48,8 @@ pub(super) fn heading(d: &Prepared, t: &Theta) -> Vec<f64> {
 pub(super) fn imu(d: &Prepared, t: &Theta) -> Vec<f64> {
     let shift = t[P::MapShift as usize];
     let sum = running_sum((0..d.n).map(|i| {
-        let grade = if shift == 0.0 {
-            d.grade[i]
-        } else {
-            d.grade_by_s.at(d.s_map[i] + shift)
-        } + t[P::GradeBias as usize];
+        let grade = if shift == 0.0 { d.grade[i] } else { d.grade_by_s.at(d.s_map[i] + shift) }
+            + t[P::GradeBias as usize];
         (d.accel_x[i] - t[P::ImuBias as usize] - Prepared::gravity_along(grade)) * Drive::STEP_S
     }));
     let scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);

@@ -1,0 +1,521 @@
+//! The diagnosis as a whole: drives in, [`Diagnosis`] out, which serialises to `diagnosis.json`.
+
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+use crate::gain::{DriveError, HORIZON_S, drive_error, rms};
+use crate::hypothesis::{CATALOGUE, CauseKind};
+use crate::problem::{Problem, Reference};
+use crate::replay::{Module, Prepared};
+use crate::search::Fit;
+use crate::sentence;
+use crate::unknown::Shape;
+use crate::{DiagnosisError, DriveSet, Executor, Finding, Plant};
+
+/// What the search concludes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Named causes explain what is wrong.
+    Explained,
+    /// Nothing beyond the tolerances of trucks, loads, weather and instruments.
+    NothingToExplain,
+    /// Something is wrong that no cause of the catalogue explains.
+    Unknown,
+    /// Two causes explain the drives equally well.
+    Ambiguous,
+}
+
+/// A quantity that the simulation gets wrong.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Wrong {
+    /// Column name.
+    pub quantity: &'static str,
+    /// Length of the free run, s; 0 for a one-step residual.
+    pub horizon_s: f64,
+    /// Root mean square error, in the quantity's unit.
+    pub rmse: f64,
+    /// Mean error, replayed minus measured.
+    pub bias: f64,
+    /// One minus the root mean square error over the root mean square of the signal.
+    pub accuracy_frac: f64,
+    /// Where it is large, in words.
+    pub r#where: String,
+    /// Root mean square error of drives that are in order.
+    pub noise_floor: f64,
+}
+
+/// A fitted parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Value; a factor for scales, otherwise an addition to the truck file's figure.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// Unit, "1" for ratios.
+    pub unit: &'static str,
+}
+
+/// Another cause that the drives cannot tell apart from the named one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Confusion {
+    /// Its id.
+    pub id: &'static str,
+    /// Why, and what would separate them.
+    pub why: String,
+}
+
+/// A named cause.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cause {
+    /// Fixed word of the catalogue.
+    pub id: &'static str,
+    /// Kind of error.
+    pub kind: CauseKind,
+    /// For a truck engineer.
+    pub sentence: String,
+    /// Size and shape.
+    pub parameters: BTreeMap<&'static str, Parameter>,
+    /// Log evidence that is lost without it, nats.
+    pub evidence: f64,
+    /// What it could be instead.
+    pub confused_with: Vec<Confusion>,
+}
+
+/// What is left outside the catalogue.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Unknown {
+    /// Signals that it follows, best first.
+    pub signals: Vec<&'static str>,
+    /// The quantity in which it shows.
+    pub quantity: &'static str,
+    /// Its shape in words.
+    pub shape: String,
+    /// Part of the excess error that a free function of the first signal explains.
+    pub explained_frac: f64,
+    /// Evidence, nats.
+    pub evidence: f64,
+    /// Signal and error at the knots of the function.
+    pub table: Vec<(f64, f64)>,
+}
+
+/// A cause that these drives cannot show.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NotObservable {
+    /// Its id.
+    pub id: &'static str,
+    /// Why.
+    pub why: String,
+}
+
+/// A figure before and after the extension.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct BeforeAfter {
+    /// With the truck file.
+    pub before: f64,
+    /// With the extended truck.
+    pub after: f64,
+}
+
+/// Gain on drives that the search has not seen.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Gain {
+    /// Their names.
+    pub held_out: Vec<String>,
+    /// Speed over 60 s, m/s.
+    pub speed_rmse_m_s: BeforeAfter,
+    /// Tractor yaw rate, rad/s.
+    pub yaw_rate_rmse_rad_s: BeforeAfter,
+    /// Error of the fuel used, part of the measured.
+    pub fuel_error_frac: BeforeAfter,
+    /// Fall of the whitened, tolerance-marginal residual norm on the held-out drives, nats.
+    pub log_score_nats: f64,
+    /// The gain stands out of the scatter between drives.
+    pub significant: bool,
+}
+
+/// Everything that was concluded.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Diagnosis {
+    /// Version of the form, 1.
+    pub schema: u32,
+    /// Version of the program.
+    pub version: &'static str,
+    /// Name of the truck file.
+    pub truck: String,
+    /// Conclusion.
+    pub verdict: Verdict,
+    /// What the simulation gets wrong.
+    pub wrong: Vec<Wrong>,
+    /// Why, in order of evidence.
+    pub causes: Vec<Cause>,
+    /// What is left without a name.
+    pub unknown: Option<Unknown>,
+    /// Causes that these drives cannot show.
+    pub not_observable: Vec<NotObservable>,
+    /// Gain on held-out drives.
+    pub gain: Option<Gain>,
+    /// File name of the extended truck, if there is one.
+    pub extended_truck: Option<String>,
+    /// Tolerances were learned from a baseline; otherwise they are defaults.
+    pub tolerances_from_baseline: bool,
+    /// Defects of the data.
+    pub findings: Vec<Finding>,
+}
+
+/// Choices of the caller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Names of drives to hold out; empty: the last quarter of the drives, if there are four.
+    pub hold_out: Vec<String>,
+    /// Cause ids that the search must not use.
+    pub excluded: Vec<String>,
+    /// Most causes in a set.
+    pub max_causes: usize,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { hold_out: Vec::new(), excluded: Vec::new(), max_causes: 4 }
+    }
+}
+
+/// How far a diagnosis is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Progress {
+    /// Learning noise and tolerances.
+    Baseline,
+    /// Searching for the next cause, with so many found.
+    Search {
+        /// Causes found so far.
+        found: usize,
+    },
+    /// Looking outside the catalogue.
+    Unknown,
+    /// Rollouts on held-out drives.
+    Gain,
+}
+
+/// Part of the evidence of a named cause within which another counts as equally good, nats.
+const AMBIGUOUS_NATS: f64 = 3.0;
+/// Evidence that a free function needs beside or instead of named causes, nats.
+const UNKNOWN_EVIDENCE: f64 = 20.0;
+
+/// Finds what the simulation of `plant` gets wrong on `drives` and names the cause.
+///
+/// `baseline` are drives of the same truck and logger that are in order.
+///
+/// # Errors
+/// No drive to learn from, or drives of another truck.
+pub fn diagnose(
+    plant: &Plant,
+    drives: &DriveSet,
+    baseline: Option<&DriveSet>,
+    options: &Options,
+    executor: &dyn Executor,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Diagnosis, DiagnosisError> {
+    let (learn, held) = split(drives, &options.hold_out)?;
+    crate::plausible::check_truck(plant, drives)?;
+    let prepare = |names: &[usize]| -> Vec<Prepared> {
+        names.iter().map(|i| Prepared::new(&drives.drives[*i], plant)).collect()
+    };
+    progress(Progress::Baseline);
+    let (problem, floor) = match baseline {
+        Some(b) => {
+            let clean = b.drives.iter().map(|d| Prepared::new(d, plant)).collect();
+            let p = Problem::learn(plant, clean, true, executor)?;
+            let zero = p.reference.theta;
+            let floor = p.drives.iter().map(|d| drive_error(d, plant, &zero)).collect();
+            (Problem::with(plant, prepare(&learn), p.reference, executor)?, floor)
+        }
+        None => {
+            (Problem::learn(plant, prepare(&learn), false, executor)?, Vec::<DriveError>::new())
+        }
+    };
+    let (open, not_observable) = observable(&problem, options);
+    let fitted = problem.search(&open, options.max_causes, &mut |found| {
+        progress(Progress::Search { found });
+    });
+    let Some((empty, fit)) = fitted else {
+        return Err(DiagnosisError::Numerics("no evidence can be computed".into()));
+    };
+    let fit = problem.gate(fit, &empty, &open);
+    progress(Progress::Unknown);
+    let (fit, shape, unexplained) = outside(&problem, &empty, fit);
+    let causes = causes(&problem, &fit, &empty, &open);
+    let verdict = if unexplained {
+        Verdict::Unknown
+    } else if fit.set.is_empty() {
+        Verdict::NothingToExplain
+    } else if causes.first().is_some_and(|c| c.1) {
+        Verdict::Ambiguous
+    } else {
+        Verdict::Explained
+    };
+    progress(Progress::Gain);
+    let held = prepare(&held);
+    let gain = (!held.is_empty() && !fit.set.is_empty())
+        .then(|| gain(plant, &problem.reference, held, &fit, executor))
+        .transpose()?;
+    let wrong = wrong(&problem, &floor);
+    let extended_truck = (!fit.set.is_empty()).then(|| format!("{}.extended.toml", plant.name));
+    Ok(Diagnosis {
+        schema: 1,
+        version: env!("CARGO_PKG_VERSION"),
+        truck: plant.name.clone(),
+        verdict,
+        wrong,
+        causes: causes.into_iter().map(|c| c.0).collect(),
+        unknown: shape,
+        not_observable,
+        gain,
+        extended_truck,
+        tolerances_from_baseline: baseline.is_some(),
+        findings: drives.findings.clone(),
+    })
+}
+
+/// Indices of drives to learn from and to hold out.
+fn split(set: &DriveSet, hold_out: &[String]) -> Result<(Vec<usize>, Vec<usize>), DiagnosisError> {
+    let n = set.drives.len();
+    for name in hold_out {
+        if !set.drives.iter().any(|d| d.name == *name) {
+            return Err(DiagnosisError::NoDrives { what: format!("no drive is named {name:?}") });
+        }
+    }
+    let (learn, held): (Vec<usize>, Vec<usize>) = if hold_out.is_empty() {
+        let keep = if n >= 4 { n - n / 4 } else { n };
+        ((0..keep).collect(), (keep..n).collect())
+    } else {
+        (0..n).partition(|i| !hold_out.contains(&set.drives[*i].name))
+    };
+    if learn.is_empty() {
+        return Err(DiagnosisError::NoDrives { what: "no drive is left to learn from".into() });
+    }
+    Ok((learn, held))
+}
+
+fn observable(problem: &Problem<'_>, options: &Options) -> (Vec<usize>, Vec<NotObservable>) {
+    let (mut open, mut not) = (Vec::new(), Vec::<NotObservable>::new());
+    let information = problem.information();
+    for (i, h) in CATALOGUE.iter().enumerate() {
+        if options.excluded.iter().any(|x| x == h.id) {
+            continue;
+        }
+        let missing: Vec<&str> = h
+            .channels
+            .iter()
+            .filter(|c| !problem.drives.iter().any(|d| d.has(&[**c])))
+            .map(|c| c.name())
+            .collect();
+        let why = if missing.is_empty() {
+            if 1.0 / information[i].max(1e-300).sqrt() > h.min_size {
+                sentence::not_excited(h.id).to_owned()
+            } else {
+                open.push(i);
+                continue;
+            }
+        } else {
+            format!("channels are missing: {}", missing.join(", "))
+        };
+        not.push(NotObservable { id: h.id, why });
+    }
+    not.retain(|n| !open.iter().any(|i| CATALOGUE[*i].id == n.id));
+    not.dedup_by(|a, b| a.id == b.id);
+    (open, not)
+}
+
+/// Decides between named causes and a free function of a signal.
+fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, bool) {
+    let drives = problem.drives.len() as f64;
+    let beyond = |shapes: Vec<Shape>| -> Vec<Shape> {
+        let mut out: Vec<Shape> = shapes
+            .into_iter()
+            .map(|mut s| {
+                s.log_z -= 3.0 * drives * problem.reference.free_form[s.module as usize].max(0.0);
+                s
+            })
+            .collect();
+        out.sort_by(|a, b| b.log_z.total_cmp(&a.log_z));
+        out
+    };
+    let bare = beyond(problem.shapes(&empty.theta));
+    let rest = if fit.set.is_empty() { bare.clone() } else { beyond(problem.shapes(&fit.theta)) };
+    let describe = |shapes: &[Shape]| {
+        shapes.first().map(|best| Unknown {
+            signals: shapes
+                .iter()
+                .filter(|s| s.module == best.module && s.log_z > 0.5 * best.log_z)
+                .take(3)
+                .map(|s| s.signal)
+                .collect(),
+            quantity: best.module.quantity(),
+            shape: sentence::shape(best),
+            explained_frac: best.explained_frac,
+            evidence: best.log_z,
+            table: best.knots.clone(),
+        })
+    };
+    let best_bare = bare.first().map_or(0.0, |s| s.log_z);
+    if best_bare > UNKNOWN_EVIDENCE && best_bare > 1.15 * fit.log_z {
+        return (empty.clone(), describe(&bare), true);
+    }
+    let left = rest.first().map_or(0.0, |s| s.log_z);
+    if left > UNKNOWN_EVIDENCE.max(0.08 * fit.log_z) {
+        let nothing_named = fit.set.is_empty();
+        return (fit, describe(&rest), nothing_named);
+    }
+    (fit, None, false)
+}
+
+fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<(Cause, bool)> {
+    let zero = &problem.reference.theta;
+    let mut out = Vec::new();
+    for (i, h) in fit.set.iter().enumerate() {
+        let hyp = &CATALOGUE[*h];
+        let (fewer, theta) = problem.without(fit, i);
+        let without = if fewer.is_empty() {
+            Some(empty.clone())
+        } else {
+            problem.fit(&fewer, &theta, empty.norm)
+        };
+        let evidence = fit.log_z - without.as_ref().map_or(0.0, |f| f.log_z);
+        let mut confused_with = Vec::new();
+        let mut ambiguous = false;
+        if let Some(f) = &without {
+            let rest: Vec<usize> = open
+                .iter()
+                .copied()
+                .filter(|o| fit.set.iter().all(|s| CATALOGUE[*s].id != CATALOGUE[*o].id))
+                .collect();
+            for c in problem.screen(f, &rest) {
+                let id = CATALOGUE[c.hypothesis].id;
+                let lost = evidence - c.gain;
+                if lost < 5.0 && confused_with.iter().all(|x: &Confusion| x.id != id) {
+                    ambiguous |= lost < AMBIGUOUS_NATS;
+                    confused_with
+                        .push(Confusion { id, why: sentence::confusion(hyp.id, id, lost) });
+                }
+            }
+        }
+        let mut parameters = BTreeMap::new();
+        for (j, p) in fit.free.iter().enumerate() {
+            if hyp.params().any(|q| q == *p) {
+                let s = p.spec();
+                let x = fit.theta[*p as usize] - zero[*p as usize];
+                let scale = s.key.ends_with("_scale") || s.key == "scale";
+                let form = if hyp.sizes.contains(p) { 0.015 * x.abs() } else { 0.0 };
+                let sigma = (fit.covariance[(j, j)] + form * form).sqrt();
+                let value = if scale { 1.0 + x } else { x };
+                parameters.insert(s.key, Parameter { value, sigma, unit: s.unit });
+            }
+        }
+        let sentence = sentence::cause(hyp.id, hyp.size(&fit.theta, zero));
+        out.push((
+            Cause { id: hyp.id, kind: hyp.kind, sentence, parameters, evidence, confused_with },
+            ambiguous,
+        ));
+    }
+    out.sort_by(|a, b| b.0.evidence.total_cmp(&a.0.evidence));
+    out
+}
+
+fn gain(
+    plant: &Plant,
+    reference: &Reference,
+    held: Vec<Prepared>,
+    fit: &Fit,
+    executor: &dyn Executor,
+) -> Result<Gain, DiagnosisError> {
+    let problem = Problem::with(plant, held, reference.clone(), executor)?;
+    let errors = |t| problem.drives.iter().map(|d| drive_error(d, plant, t)).collect::<Vec<_>>();
+    let (before, after) = (errors(&reference.theta), errors(&fit.theta));
+    let norm = |t| problem.gram(t, &[]).0.per_drive.iter().map(|g| g[(0, 0)]).collect::<Vec<_>>();
+    let gains: Vec<f64> =
+        norm(&reference.theta).iter().zip(norm(&fit.theta)).map(|(b, a)| 0.5 * (b - a)).collect();
+    let both = |f: fn(&DriveError) -> [f64; 2]| BeforeAfter {
+        before: rms(before.iter().map(f)),
+        after: rms(after.iter().map(f)),
+    };
+    let fuel = |e: &[DriveError]| {
+        let (d, m) = e.iter().fold((0.0, 0.0), |a, e| (a.0 + e.fuel[0], a.1 + e.fuel[1]));
+        if m > 0.0 { f64::abs(d) / m } else { 0.0 }
+    };
+    let total: f64 = gains.iter().sum();
+    Ok(Gain {
+        held_out: problem.drives.iter().map(|d| d.name.clone()).collect(),
+        speed_rmse_m_s: both(|e| e.speed),
+        yaw_rate_rmse_rad_s: both(|e| e.yaw),
+        fuel_error_frac: BeforeAfter { before: fuel(&before), after: fuel(&after) },
+        log_score_nats: total,
+        significant: total > 3.0 && gains.iter().all(|g| *g > -3.0),
+    })
+}
+
+/// Root mean square of the measured signal of a module over its rows.
+fn signal_rms(problem: &Problem<'_>, m: Module) -> f64 {
+    let step = m.row_step();
+    rms(problem.drives.iter().map(|d| {
+        let x = d.measured(m);
+        d.valid[m as usize]
+            .iter()
+            .enumerate()
+            .filter(|(k, ok)| **ok && k * step < x.len())
+            .fold([0.0, 0.0], |a, (k, _)| [a[0] + x[k * step] * x[k * step], a[1] + 1.0])
+    }))
+}
+
+fn wrong(problem: &Problem<'_>, floor: &[DriveError]) -> Vec<Wrong> {
+    let zero = problem.reference.theta;
+    let errors: Vec<DriveError> =
+        problem.drives.iter().map(|d| drive_error(d, problem.plant, &zero)).collect();
+    let mut out = Vec::new();
+    let samples: f64 = errors.iter().map(|e| e.speed[1]).sum();
+    if samples > 0.0 {
+        let rmse = rms(errors.iter().map(|e| e.speed));
+        let power = (errors.iter().map(|e| e.speed_power).sum::<f64>() / samples).sqrt();
+        out.push(Wrong {
+            quantity: "speed_m_s",
+            horizon_s: HORIZON_S,
+            rmse,
+            bias: errors.iter().map(|e| e.speed_sum).sum::<f64>() / samples,
+            accuracy_frac: 1.0 - rmse / power.max(1e-9),
+            r#where: sentence::places(problem, Module::Force),
+            noise_floor: rms(floor.iter().map(|e| e.speed)),
+        });
+    }
+    for m in Module::ALL {
+        let i = m as usize;
+        if m == Module::Force || !problem.drives.iter().any(|d| d.available[i]) {
+            continue;
+        }
+        let (mut chi, mut rows, mut sum) = (0.0, 0.0, 0.0);
+        for k in 0..problem.drives.len() {
+            let w = problem.whitened(k, &zero);
+            for (x, ok) in w[i].iter().zip(&problem.drives[k].valid[i]) {
+                if *ok {
+                    chi += x * x;
+                    sum += x;
+                    rows += 1.0;
+                }
+            }
+        }
+        let sigma = problem.reference.whiteners[i].sigma;
+        let ratio = chi / f64::max(rows, 1.0);
+        let floor = problem.reference.ratio[i].max(1.0);
+        if ratio > 1.5 * floor {
+            out.push(Wrong {
+                quantity: m.quantity(),
+                horizon_s: 0.0,
+                rmse: sigma * ratio.sqrt(),
+                bias: -sigma * sum / rows,
+                accuracy_frac: 1.0 - sigma * ratio.sqrt() / signal_rms(problem, m).max(1e-12),
+                r#where: sentence::places(problem, m),
+                noise_floor: sigma * floor.sqrt(),
+            });
+        }
+    }
+    out
+}

@@ -1,0 +1,77 @@
+//! What an extension is worth on drives that it has not seen: rollouts of 60 s before and after.
+
+use crate::Drive;
+use crate::Plant;
+use crate::param::Theta;
+use crate::problem::replay;
+use crate::replay::force::Longitudinal;
+use crate::replay::{Module, Prepared};
+
+/// Length of a rollout, s.
+pub(crate) const HORIZON_S: f64 = 60.0;
+
+/// Errors of one drive under one model.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct DriveError {
+    /// Sum of squared speed errors over all rollout samples, and their number.
+    pub(crate) speed: [f64; 2],
+    /// Sum of speed errors.
+    pub(crate) speed_sum: f64,
+    /// Sum of squared speeds, for the accuracy.
+    pub(crate) speed_power: f64,
+    /// The same for the yaw rate.
+    pub(crate) yaw: [f64; 2],
+    /// Modelled minus measured fuel and measured fuel, in samples times g/s.
+    pub(crate) fuel: [f64; 2],
+}
+
+/// Free runs of the speed over [`HORIZON_S`] with measured torque, gear and pressure; shifts carry
+/// the measured change of speed.
+pub(crate) fn drive_error(d: &Prepared, plant: &Plant, theta: &Theta) -> DriveError {
+    let mut e = DriveError::default();
+    if d.available[Module::Force as usize] {
+        let model = Longitudinal::new(d, plant, theta);
+        let steps = (HORIZON_S / Drive::STEP_S) as usize;
+        let mut start = 0;
+        let mut brake_k = 0.0;
+        let scale = 1.0 / (1.0 + theta[crate::param::P::SpeedScale as usize]);
+        while start + steps < d.n {
+            let mut v = d.speed[start];
+            for i in start..start + steps {
+                let moving = d.engaged[i] && d.speed[i] > 3.0;
+                let a = model.acceleration(i, v.max(0.5) * scale, &mut brake_k);
+                v += if moving { a * Drive::STEP_S / scale } else { d.speed[i + 1] - d.speed[i] };
+                v = v.clamp(0.0, 60.0);
+                let error = v - d.speed[i + 1];
+                e.speed[0] += error * error;
+                e.speed[1] += 1.0;
+                e.speed_sum += error;
+                e.speed_power += d.speed[i + 1] * d.speed[i + 1];
+            }
+            start += steps;
+        }
+    }
+    let r = replay(d, plant, theta);
+    for (x, ok) in r[Module::Yaw as usize].iter().zip(&d.valid[Module::Yaw as usize]) {
+        if *ok {
+            e.yaw[0] += x * x;
+            e.yaw[1] += 1.0;
+        }
+    }
+    for (k, (x, ok)) in
+        r[Module::Fuel as usize].iter().zip(&d.valid[Module::Fuel as usize]).enumerate()
+    {
+        if *ok {
+            let measured = d.fuel[4 * k..4 * k + 4].iter().sum::<f64>() * 0.25;
+            e.fuel[0] -= x * (0.03 + 0.01 * measured);
+            e.fuel[1] += measured;
+        }
+    }
+    e
+}
+
+/// Root mean square over several drives.
+pub(crate) fn rms(parts: impl Iterator<Item = [f64; 2]>) -> f64 {
+    let (s, n) = parts.fold((0.0, 0.0), |a, p| (a.0 + p[0], a.1 + p[1]));
+    if n > 0.0 { (s / n).sqrt() } else { 0.0 }
+}

@@ -1,0 +1,53 @@
+//! Do the drives belong to this truck? Engine speed over wheel speed in every gear says so.
+
+use crate::{Channel as C, DiagnosisError, DriveSet, Plant};
+
+/// Deviation of the overall ratio that no tyre wear or slip explains.
+const MAX_DEVIATION: f64 = 0.08;
+
+pub(crate) fn check_truck(plant: &Plant, set: &DriveSet) -> Result<(), DiagnosisError> {
+    let gears = plant.gear_ratios.len();
+    let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); gears + 1];
+    let mut beyond = 0_usize;
+    for d in &set.drives {
+        let (Some(v), Some(n), Some(g)) =
+            (d.get(C::SpeedMS), d.get(C::EngineSpeedRpm), d.get(C::Gear))
+        else {
+            continue;
+        };
+        let shifting = d.get(C::ShiftInProcess);
+        for i in (0..d.len).step_by(7) {
+            if v[i] < 4.0 || shifting.is_some_and(|s| s[i] > 0.5) || g[i] < 1.0 {
+                continue;
+            }
+            match ratios.get_mut(g[i] as usize) {
+                Some(r) => r.push(n[i] / tractrix_core::RPM_PER_RAD_S / v[i]),
+                None => beyond += 1,
+            }
+        }
+    }
+    let total: usize = ratios.iter().map(Vec::len).sum();
+    let (mut wrong, mut worst) = (beyond, (0, 0.0, 0.0, 0_usize));
+    for (gear, r) in ratios.iter_mut().enumerate().skip(1) {
+        if r.len() < 20 {
+            continue;
+        }
+        r.sort_by(f64::total_cmp);
+        let measured = r[r.len() / 2];
+        let expected = plant.gear_ratios[gear - 1] * plant.final_drive_ratio / plant.wheel_radius_m;
+        if (measured / expected - 1.0).abs() > MAX_DEVIATION {
+            wrong += r.len();
+            if r.len() > worst.3 {
+                worst = (gear, measured, expected, r.len());
+            }
+        }
+    }
+    if total + beyond > 200 && 2 * wrong > total + beyond {
+        return Err(DiagnosisError::WrongTruck {
+            gear: worst.0,
+            measured: worst.1,
+            expected: worst.2,
+        });
+    }
+    Ok(())
+}

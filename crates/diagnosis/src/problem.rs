@@ -1,0 +1,459 @@
+//! Residuals, sensitivities and tolerances of a set of drives in one nuisance-marginal metric.
+//!
+//! Per drive `M = I - Z (I + Z'Z)^-1 Z'`, the columns of `Z` being the sensitivities to the
+//! tolerances of that drive (load sheet, weather, instruments), scaled by their standard
+//! deviations. Everything that the search needs is a Gram matrix in `M`, kept per drive.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::param::{P, PARAMS, SPECS, Theta};
+use crate::replay::{GROUPS, Group, MODULES, Module, Prepared, Residuals, affects, replay_group};
+use crate::stats::whiten::Whitener;
+use crate::{DiagnosisError, Executor, Plant};
+
+/// Tolerances, calibration and noise of a truck and its logger.
+#[derive(Debug, Clone)]
+pub(crate) struct Reference {
+    /// Common calibration, the zero of all causes.
+    pub(crate) theta: Theta,
+    /// Scatter between drives, per parameter; 0 where none.
+    pub(crate) tolerance: [f64; PARAMS],
+    pub(crate) whiteners: Vec<Whitener>,
+    /// Mean square of whitened residuals at the calibration, tolerances included, per module.
+    pub(crate) ratio: [f64; MODULES],
+    /// Evidence of the best free function per module on drives that are in order, nats per drive.
+    pub(crate) free_form: [f64; MODULES],
+}
+
+/// Whitened columns per module; empty where zero.
+pub(crate) type Column = [Vec<f64>; MODULES];
+
+struct Nuisance {
+    /// Residuals at the reference, and whitened.
+    base: Residuals,
+    whitened: Column,
+    columns: Vec<Column>,
+    factor: nalgebra::Cholesky<f64, nalgebra::Dyn>,
+}
+
+/// A set of drives ready for the search.
+pub(crate) struct Problem<'a> {
+    pub(crate) plant: &'a Plant,
+    pub(crate) drives: Vec<Prepared>,
+    pub(crate) reference: Reference,
+    nuisance: Vec<Nuisance>,
+    executor: &'a dyn Executor,
+}
+
+/// A direction in parameter space: from `base`, a step of `step` along `p`.
+#[derive(Debug, Clone)]
+pub(crate) struct Direction {
+    pub(crate) p: P,
+    /// Shape parameters that hold while the direction is taken.
+    pub(crate) shape: Vec<(P, f64)>,
+    pub(crate) step: f64,
+}
+
+/// Marginal Gram matrix per drive over `[r, columns]`.
+#[derive(Debug, Clone)]
+pub(crate) struct Gram {
+    pub(crate) per_drive: Vec<DMatrix<f64>>,
+}
+
+impl Gram {
+    /// Information, gradient and residual norm over the drives chosen.
+    pub(crate) fn sum(&self, pick: impl Fn(usize) -> bool) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let k = self.per_drive.first().map_or(1, DMatrix::nrows);
+        let mut total = DMatrix::zeros(k, k);
+        for (i, g) in self.per_drive.iter().enumerate() {
+            if pick(i) {
+                total += g;
+            }
+        }
+        let a = total.view((1, 1), (k - 1, k - 1)).into_owned();
+        let b = total.view((1, 0), (k - 1, 1)).column(0).into_owned();
+        (a, b, total[(0, 0)])
+    }
+}
+
+/// Limit of a whitened residual: beyond it a row says "wrong" but not "how wrong".
+const CLIP: f64 = 1e3;
+
+fn order(m: Module) -> usize {
+    match m {
+        Module::Shift => 0,
+        Module::Force | Module::Imu => 8,
+        _ => 6,
+    }
+}
+
+impl Reference {
+    fn start(drives: &[Prepared], residuals: &[Residuals], theta: Theta) -> Self {
+        let mut tolerance = [0.0; PARAMS];
+        for (t, s) in tolerance.iter_mut().zip(&SPECS) {
+            *t = s.tolerance;
+        }
+        let whiteners = fit_whiteners(drives, residuals, true);
+        Self { theta, tolerance, whiteners, ratio: [1.0; MODULES], free_form: [0.0; MODULES] }
+    }
+}
+
+fn fit_whiteners(drives: &[Prepared], residuals: &[Residuals], white: bool) -> Vec<Whitener> {
+    Module::ALL
+        .iter()
+        .map(|m| {
+            let i = *m as usize;
+            let records = drives
+                .iter()
+                .zip(residuals)
+                .filter(|(d, _)| d.available[i])
+                .map(|(d, r)| (r[i].as_slice(), d.valid[i].as_slice()));
+            let fitted = Whitener::fit(records, if white { 0 } else { order(*m) });
+            let mut w = fitted.unwrap_or_else(|| Whitener::white(1.0));
+            w.sigma = w.sigma.max(floor(*m));
+            w
+        })
+        .collect()
+}
+
+/// Resolution of the channels: noise is never assumed smaller.
+fn floor(m: Module) -> f64 {
+    match m {
+        Module::Force | Module::Imu | Module::Gps => 1e-3,
+        Module::Torque => 0.2,
+        Module::Fuel => 0.05,
+        Module::Brake => 0.3,
+        Module::Shift => 0.02,
+        Module::Yaw | Module::TrailerYaw | Module::Heading => 5e-5,
+        Module::AccelY | Module::Altitude => 1e-2,
+    }
+}
+
+fn nuisance_directions(tolerance: &[f64; PARAMS]) -> Vec<Direction> {
+    SPECS
+        .iter()
+        .filter(|s| tolerance[s.p as usize] > 0.0)
+        .map(|s| Direction { p: s.p, shape: Vec::new(), step: s.step })
+        .collect()
+}
+
+impl<'a> Problem<'a> {
+    /// Learns calibration, tolerances and noise from drives that are in order (`clean`), or only
+    /// the noise from drives that need not be.
+    pub(crate) fn learn(
+        plant: &'a Plant,
+        drives: Vec<Prepared>,
+        clean: bool,
+        executor: &'a dyn Executor,
+    ) -> Result<Self, DiagnosisError> {
+        let theta = [0.0; PARAMS];
+        let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
+        let reference = Reference::start(&drives, &residuals, theta);
+        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), executor };
+        problem.refresh()?;
+        for round in 0..3 {
+            if clean || round > 0 {
+                problem.calibrate(clean)?;
+            }
+            let mut noise = Vec::with_capacity(problem.drives.len());
+            let mut second: Vec<f64> = vec![0.0; PARAMS];
+            for i in 0..problem.drives.len() {
+                let (z, variance) = problem.nuisance_posterior(i)?;
+                for (s, (z, v)) in nuisance_directions(&problem.reference.tolerance)
+                    .iter()
+                    .zip(z.iter().zip(&variance))
+                {
+                    let sigma = problem.reference.tolerance[s.p as usize];
+                    second[s.p as usize] += sigma * sigma * (z * z + v);
+                }
+                noise.push(problem.without_nuisance(i, &z));
+            }
+            problem.reference.whiteners = fit_whiteners(&problem.drives, &noise, false);
+            if clean && round > 0 {
+                let count = problem.drives.len() as f64;
+                for s in SPECS.iter().filter(|s| s.tolerance > 0.0) {
+                    let prior = 2.0;
+                    let v = (prior * s.tolerance * s.tolerance + second[s.p as usize])
+                        / (prior + count);
+                    let bound = match s.p {
+                        P::TurboLag | P::PedalDelay | P::TorqueReport => 1.5,
+                        _ => 10.0,
+                    };
+                    problem.reference.tolerance[s.p as usize] = v.sqrt().min(bound * s.tolerance);
+                }
+            }
+            problem.refresh()?;
+        }
+        if clean {
+            problem.reference.ratio = problem.ratios(&problem.reference.theta);
+            let count = problem.drives.len() as f64;
+            for s in problem.shapes(&problem.reference.theta) {
+                let f = &mut problem.reference.free_form[s.module as usize];
+                *f = f.max(s.log_z / count);
+            }
+        }
+        Ok(problem)
+    }
+
+    /// Mean square of whitened residuals per module; 1 where a module has no rows.
+    pub(crate) fn ratios(&self, theta: &Theta) -> [f64; MODULES] {
+        let mut sums = [(0.0, 0.0); MODULES];
+        for (i, d) in self.drives.iter().enumerate() {
+            for ((sum, w), ok) in sums.iter_mut().zip(&self.at(i, theta).1).zip(&d.valid) {
+                sum.0 += w.iter().map(|x| x * x).sum::<f64>();
+                sum.1 += ok.iter().filter(|x| **x).count() as f64;
+            }
+        }
+        sums.map(|(s, n)| if n > 0.0 && s > 0.0 { s / n } else { 1.0 })
+    }
+
+    /// A problem on other drives with a reference learned before.
+    pub(crate) fn with(
+        plant: &'a Plant,
+        drives: Vec<Prepared>,
+        reference: Reference,
+        executor: &'a dyn Executor,
+    ) -> Result<Self, DiagnosisError> {
+        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), executor };
+        problem.refresh()?;
+        Ok(problem)
+    }
+
+    fn each<T: Send>(&self, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let slots: Vec<std::sync::Mutex<Option<T>>> =
+            self.drives.iter().map(|_| std::sync::Mutex::new(None)).collect();
+        self.executor.run(self.drives.len(), &|i| {
+            let value = f(i);
+            if let Ok(mut slot) = slots[i].lock() {
+                *slot = Some(value);
+            }
+        });
+        slots.into_iter().filter_map(|s| s.into_inner().ok().flatten()).collect()
+    }
+
+    fn refresh(&mut self) -> Result<(), DiagnosisError> {
+        let directions = nuisance_directions(&self.reference.tolerance);
+        let theta = self.reference.theta;
+        let built = self.each(|i| {
+            let base = replay(&self.drives[i], self.plant, &theta);
+            let columns: Vec<Column> = directions
+                .iter()
+                .map(|d| {
+                    let mut c = self.column(i, &theta, &base, d);
+                    let sigma = self.reference.tolerance[d.p as usize];
+                    c.iter_mut().flatten().for_each(|x| *x *= sigma);
+                    c
+                })
+                .collect();
+            let q = columns.len();
+            let mut s = DMatrix::identity(q, q);
+            for a in 0..q {
+                for b in a..q {
+                    let v = dot(&columns[a], &columns[b]);
+                    s[(a, b)] += v;
+                    if a != b {
+                        s[(b, a)] += v;
+                    }
+                }
+            }
+            let whitened = self.whiten(i, &base);
+            s.cholesky().map(|factor| Nuisance { base, whitened, columns, factor })
+        });
+        self.nuisance = built
+            .into_iter()
+            .collect::<Option<Vec<_>>>()
+            .ok_or_else(|| DiagnosisError::Numerics("tolerances of a drive".into()))?;
+        Ok(())
+    }
+
+    /// Whitened residuals of a drive.
+    fn whiten(&self, i: usize, r: &Residuals) -> Column {
+        core::array::from_fn(|m| self.whiten_module(i, m, &r[m]))
+    }
+
+    fn whiten_module(&self, i: usize, m: usize, r: &[f64]) -> Vec<f64> {
+        if r.is_empty() {
+            return Vec::new();
+        }
+        let mut w = self.reference.whiteners[m].apply(r, &self.drives[i].valid[m]);
+        w.iter_mut().for_each(|x| *x = if x.is_finite() { x.clamp(-CLIP, CLIP) } else { CLIP });
+        w
+    }
+
+    /// Whitened sensitivity: minus the derivative of the residual along the direction.
+    fn column(&self, i: usize, theta: &Theta, base: &Residuals, direction: &Direction) -> Column {
+        let d = &self.drives[i];
+        let mut t = *theta;
+        for (p, v) in &direction.shape {
+            t[*p as usize] = *v;
+        }
+        t[direction.p as usize] += direction.step;
+        let mut moved = Residuals::default();
+        for g in affects(direction.p) {
+            replay_group(d, self.plant, &t, *g, &mut moved);
+        }
+        core::array::from_fn(|m| {
+            if moved[m].is_empty() {
+                return Vec::new();
+            }
+            let difference: Vec<f64> =
+                base[m].iter().zip(&moved[m]).map(|(b, x)| (b - x) / direction.step).collect();
+            self.reference.whiteners[m].apply(&difference, &d.valid[m])
+        })
+    }
+
+    /// Gram matrix of the residual at `theta` and the directions from there, and the raw
+    /// (not marginal) chi-square per module.
+    pub(crate) fn gram(&self, theta: &Theta, directions: &[Direction]) -> (Gram, [f64; MODULES]) {
+        let parts = self.each(|i| {
+            let (base, whitened) = self.at(i, theta);
+            let mut columns = vec![whitened];
+            columns.extend(directions.iter().map(|d| self.column(i, theta, &base, d)));
+            let chi: [f64; MODULES] =
+                core::array::from_fn(|m| columns[0][m].iter().map(|x| x * x).sum());
+            (self.marginal(i, &columns), chi)
+        });
+        let mut chi = [0.0; MODULES];
+        for p in &parts {
+            for (c, x) in chi.iter_mut().zip(&p.1) {
+                *c += x;
+            }
+        }
+        (Gram { per_drive: parts.into_iter().map(|p| p.0).collect() }, chi)
+    }
+
+    /// Residuals of a drive at `theta`, raw and whitened; only groups whose parameters differ
+    /// from the reference are replayed.
+    fn at(&self, i: usize, theta: &Theta) -> (Residuals, Column) {
+        let nuisance = &self.nuisance[i];
+        let (mut base, mut whitened) = (nuisance.base.clone(), nuisance.whitened.clone());
+        let mut moved: Vec<Group> = Vec::new();
+        for s in &SPECS {
+            if theta[s.p as usize] != self.reference.theta[s.p as usize] {
+                for g in affects(s.p) {
+                    if !moved.contains(g) {
+                        moved.push(*g);
+                    }
+                }
+            }
+        }
+        for g in moved {
+            replay_group(&self.drives[i], self.plant, theta, g, &mut base);
+            for m in g.modules() {
+                whitened[*m as usize] = self.whiten_module(i, *m as usize, &base[*m as usize]);
+            }
+        }
+        (base, whitened)
+    }
+
+    /// Gram matrix of given columns in the metric `M` of a drive.
+    pub(crate) fn marginal(&self, i: usize, columns: &[Column]) -> DMatrix<f64> {
+        let nuisance = &self.nuisance[i];
+        let (k, q) = (columns.len(), nuisance.columns.len());
+        let mut g = DMatrix::zeros(k, k);
+        for a in 0..k {
+            for b in a..k {
+                let v = dot(&columns[a], &columns[b]);
+                g[(a, b)] = v;
+                g[(b, a)] = v;
+            }
+        }
+        if q > 0 {
+            let zc = DMatrix::from_fn(q, k, |a, b| dot(&nuisance.columns[a], &columns[b]));
+            if let Some(y) = nuisance.factor.l().solve_lower_triangular(&zc) {
+                g -= y.transpose() * y;
+            }
+        }
+        g
+    }
+
+    /// Whitened residuals of drive `i` at `theta`.
+    pub(crate) fn whitened(&self, i: usize, theta: &Theta) -> Column {
+        self.at(i, theta).1
+    }
+
+    /// Posterior of a drive's tolerances at the reference: mean and variance, in their sigmas.
+    fn nuisance_posterior(&self, i: usize) -> Result<(Vec<f64>, Vec<f64>), DiagnosisError> {
+        let r = self.whitened(i, &self.reference.theta);
+        let n = &self.nuisance[i];
+        let zr = DVector::from_iterator(n.columns.len(), n.columns.iter().map(|c| dot(c, &r)));
+        let z = n.factor.solve(&zr);
+        let inverse = n.factor.inverse();
+        let variance = inverse.diagonal().iter().copied().collect();
+        Ok((z.iter().copied().collect(), variance))
+    }
+
+    /// Raw residuals of a drive after its tolerances are taken out.
+    fn without_nuisance(&self, i: usize, z: &[f64]) -> Residuals {
+        let d = &self.drives[i];
+        let mut t = self.reference.theta;
+        for (s, z) in nuisance_directions(&self.reference.tolerance).iter().zip(z) {
+            t[s.p as usize] += z * self.reference.tolerance[s.p as usize];
+        }
+        replay(d, self.plant, &t)
+    }
+
+    /// Gauss-Newton steps of the common calibration.
+    fn calibrate(&mut self, clean: bool) -> Result<(), DiagnosisError> {
+        if !clean {
+            return Ok(());
+        }
+        let free: Vec<&crate::param::Spec> = SPECS.iter().filter(|s| s.calibration > 0.0).collect();
+        let directions: Vec<Direction> = free
+            .iter()
+            .map(|s| Direction { p: s.p, shape: Vec::new(), step: 0.3 * s.step })
+            .collect();
+        let cost = |norm: f64, t: &Theta| {
+            norm + free.iter().map(|s| (t[s.p as usize] / s.calibration).powi(2)).sum::<f64>()
+        };
+        let mut theta = self.reference.theta;
+        let (mut gram, _) = self.gram(&theta, &directions);
+        let mut best = cost(gram.sum(|_| true).2, &theta);
+        for _ in 0..3 {
+            let (mut a, mut b, _) = gram.sum(|_| true);
+            for (j, s) in free.iter().enumerate() {
+                let precision = 1.0 / (s.calibration * s.calibration);
+                a[(j, j)] += precision;
+                b[j] -= precision * theta[s.p as usize];
+            }
+            let step = a
+                .cholesky()
+                .ok_or_else(|| DiagnosisError::Numerics("calibration".into()))?
+                .solve(&b);
+            let mut factor = 1.0;
+            let mut improved = false;
+            while !improved && factor > 0.05 {
+                let mut t = theta;
+                for (s, d) in free.iter().zip(step.iter()) {
+                    let x = &mut t[s.p as usize];
+                    *x = (*x + factor * d).clamp(s.lo, s.hi);
+                }
+                let (g, _) = self.gram(&t, &directions);
+                let c = cost(g.sum(|_| true).2, &t);
+                if c < best {
+                    (theta, gram, best, improved) = (t, g, c, true);
+                }
+                factor *= 0.4;
+            }
+            if !improved {
+                break;
+            }
+        }
+        self.reference.theta = theta;
+        self.refresh()
+    }
+}
+
+/// All residuals of a drive.
+pub(crate) fn replay(d: &Prepared, plant: &Plant, theta: &Theta) -> Residuals {
+    let mut out = Residuals::default();
+    for g in GROUPS {
+        let _: Group = g;
+        replay_group(d, plant, theta, g, &mut out);
+    }
+    out
+}
+
+fn dot(a: &Column, b: &Column) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>()).sum()
+}

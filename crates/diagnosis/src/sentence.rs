@@ -1,0 +1,199 @@
+//! Words for a truck engineer.
+
+use crate::problem::Problem;
+use crate::replay::{Module, Prepared};
+use crate::unknown::Shape;
+
+/// The sentence of a cause of size `x`.
+pub(crate) fn cause(id: &str, x: f64) -> String {
+    let percent = (100.0 * x.abs()).round();
+    let more = if x >= 0.0 { "higher" } else { "lower" };
+    let scaled = |what: &str| format!("{what} is {percent} % {more} than modelled.");
+    let side = if x >= 0.0 { "left" } else { "right" };
+    match id {
+        "rolling_resistance" => scaled("Rolling resistance"),
+        "air_drag" => scaled("The drag area"),
+        "headwind" => format!(
+            "A steady {} of {:.1} m/s acts in all drives.",
+            if x >= 0.0 { "headwind" } else { "tailwind" },
+            x.abs()
+        ),
+        "wind" => format!("An earth-fixed wind of {x:.1} m/s blows in all drives."),
+        "mass" => scaled("The true mass"),
+        "grade_bias" => format!(
+            "The map's grade is {:.2} % too {}.",
+            100.0 * x.abs(),
+            if x >= 0.0 { "low" } else { "high" }
+        ),
+        "map_shift" => format!(
+            "The map is {:.0} m {} of the road.",
+            x.abs(),
+            if x >= 0.0 { "behind" } else { "ahead" }
+        ),
+        "tyre_warmup" => format!("Cold tyres roll {percent} % harder at the start and warm up."),
+        "driveline_loss" => format!(
+            "The driveline loses {:.1} % {} than modelled.",
+            100.0 * x.abs(),
+            if x >= 0.0 { "more" } else { "less" }
+        ),
+        "fan_load" => format!("An engine fan takes {x:.0} kW when the coolant is hot."),
+        "dragging_brake" => {
+            format!("A constant force of {x:.0} N holds the truck back: a dragging brake.")
+        }
+        "engine_friction" => scaled("Engine friction"),
+        "altitude_derate" => {
+            format!("Full-load torque falls by {:.1} % per 1000 m at altitude.", 100.0 * x)
+        }
+        "heat_derate" => {
+            format!("Full-load torque falls by {:.1} % per 10 K in the heat.", 100.0 * x)
+        }
+        "turbo_lag" => format!(
+            "Torque builds up {:.2} s {} than modelled.",
+            x.abs(),
+            if x >= 0.0 { "slower" } else { "faster" }
+        ),
+        "pedal_delay" => format!("The pedal acts {x:.2} s later than modelled."),
+        "shift_duration" => {
+            format!("Shifts last {:.2} s {}.", x.abs(), if x >= 0.0 { "longer" } else { "shorter" })
+        }
+        "fuel_map_low_load" => format!(
+            "At low load the engine burns {percent} % {} fuel than modelled.",
+            if x >= 0.0 { "more" } else { "less" }
+        ),
+        "brake_gain" => scaled("Brake force per pressure"),
+        "brake_fade" => format!("Hot brakes lose {percent} % of their force per 100 K."),
+        "brake_delay" => format!("The brakes answer {x:.2} s later than modelled."),
+        "hidden_retarder" => "A retarder acts that the model does not have.".to_owned(),
+        "speed_scale" => format!(
+            "The wheel speed reads {:.1} % too {}.",
+            100.0 * x.abs(),
+            if x >= 0.0 { "high" } else { "low" }
+        ),
+        "yaw_rate_bias" => format!("The yaw-rate sensor has an offset of {x:.4} rad/s."),
+        "steering_ratio" => scaled("The steering ratio"),
+        "steering_offset" => format!(
+            "The steering wheel stands {:.3} rad to the {side} on a straight road.",
+            x.abs()
+        ),
+        "steering_free_play" => {
+            format!("The steering has {x:.3} rad of free play at the hand wheel.")
+        }
+        "steering_lag" => format!("Steering acts {x:.2} s later than modelled."),
+        "cornering_stiffness_front" => scaled("Cornering stiffness of the steer axle"),
+        "cornering_stiffness_drive" => scaled("Cornering stiffness of the drive axles"),
+        "cornering_stiffness_trailer" => scaled("Cornering stiffness of the trailer axles"),
+        "payload_position" => format!(
+            "The payload lies {:.2} m further {}.",
+            x.abs(),
+            if x >= 0.0 { "back" } else { "forward" }
+        ),
+        "road_bank" => format!("The road is banked by {:.4} rad, {} side up.", x.abs(), side),
+        "crosswind" => format!("A crosswind of {:.1} m/s blows to the {side}.", x.abs()),
+        other => format!("{other}: {x:.3}."),
+    }
+}
+
+/// Why two causes look alike, and what would tell them apart.
+pub(crate) fn confusion(a: &str, b: &str, lost_nats: f64) -> String {
+    let has = |x: &[&str]| x.contains(&a) && x.contains(&b);
+    let road_load = ["rolling_resistance", "air_drag", "headwind", "dragging_brake", "wind"];
+    let reason = if has(&road_load) {
+        "the drives vary speed, load or heading too little; coast down from 85 to 30 km/h, loaded and empty, in both directions"
+    } else if has(&["mass", "grade_bias", "driveline_loss", "rolling_resistance"]) {
+        "accelerations and grades of both signs are needed; accelerate hard on the flat and coast on a known grade"
+    } else if has(&["steering_ratio", "cornering_stiffness_front", "cornering_stiffness_drive"]) {
+        "curves at one speed only; drive the same curve at 40 and 80 km/h"
+    } else if has(&["steering_offset", "yaw_rate_bias", "road_bank", "crosswind"]) {
+        "straight road at one speed; stand still for the gyro, drive straight slowly and fast in both directions"
+    } else if has(&["brake_gain", "brake_fade", "hidden_retarder"]) {
+        "stops with cold and with hot brakes are needed"
+    } else if has(&["altitude_derate", "heat_derate"]) {
+        "full load high and cold, and low and hot, is needed"
+    } else if has(&["cornering_stiffness_trailer", "payload_position"]) {
+        "drive the same curves empty and loaded"
+    } else {
+        "both act on the same signals in these drives; repeat with other loads, speeds and grades"
+    };
+    format!("{reason} (it explains the drives {lost_nats:.1} nats worse)")
+}
+
+/// Why a cause cannot be seen although its channels are there.
+pub(crate) fn not_excited(id: &str) -> &'static str {
+    match id {
+        "brake_fade" => "no braking above 150 degC",
+        "altitude_derate" => "no full load at altitude",
+        "heat_derate" => "no full load in the heat",
+        "fan_load" => "the coolant stays cool",
+        "tyre_warmup" => "no drive starts with cold tyres",
+        "payload_position" => "no drive with payload in curves",
+        "brake_gain" | "brake_delay" => "too little braking",
+        _ => "the drives excite it too little",
+    }
+}
+
+/// A free function in words.
+pub(crate) fn shape(s: &Shape) -> String {
+    let extreme = s
+        .knots
+        .iter()
+        .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+        .copied()
+        .unwrap_or((0.0, 0.0));
+    let word = if extreme.1 >= 0.0 { "a rise" } else { "a dip" };
+    format!(
+        "{word} of {:.3} in the {} balance near {} = {:.4}",
+        extreme.1.abs(),
+        s.module.quantity(),
+        s.signal,
+        extreme.0
+    )
+}
+
+/// Where the residuals of a module are largest: the worst bin over speed, grade and time.
+pub(crate) fn places(problem: &Problem<'_>, m: Module) -> String {
+    type Read = fn(&Prepared, usize) -> f64;
+    let axes: [(&str, &str, f64, Read); 3] = [
+        ("speed", "km/h", 20.0, |d, i| 3.6 * d.speed[i]),
+        ("grade", "%", 1.0, |d, i| 100.0 * d.grade[i]),
+        ("gear", "", 1.0, |d, i| d.gear[i] as f64),
+    ];
+    if m == Module::Shift {
+        return "in shifts".to_owned();
+    }
+    let step = m.row_step();
+    let zero = problem.reference.theta;
+    let mut parts = Vec::new();
+    let whitened: Vec<_> = (0..problem.drives.len()).map(|i| problem.whitened(i, &zero)).collect();
+    for (name, unit, width, read) in axes {
+        let mut bins = std::collections::BTreeMap::<i64, (f64, f64)>::new();
+        let (mut all, mut count) = (0.0, 0.0);
+        for (d, w) in problem.drives.iter().zip(&whitened) {
+            for (k, x) in w[m as usize].iter().enumerate() {
+                if d.valid[m as usize].get(k) == Some(&true) {
+                    let bin = (read(d, (k * step).min(d.n - 1)) / width).floor() as i64;
+                    let b = bins.entry(bin).or_default();
+                    b.0 += x * x;
+                    b.1 += 1.0;
+                    all += x * x;
+                    count += 1.0;
+                }
+            }
+        }
+        let mean = all / f64::max(count, 1.0);
+        let worst = bins
+            .iter()
+            .filter(|b| b.1.1 > 0.02 * count)
+            .max_by(|a, b| (a.1.0 / a.1.1).total_cmp(&(b.1.0 / b.1.1)));
+        if let Some((bin, (s, n))) = worst
+            && s / n > 1.3 * mean
+        {
+            let (lo, hi) = (*bin as f64 * width, (*bin + 1) as f64 * width);
+            parts.push(if name == "gear" {
+                format!("gear {bin}")
+            } else {
+                format!("{name} {lo:.0} to {hi:.0} {unit}")
+            });
+        }
+    }
+    if parts.is_empty() { "everywhere".to_owned() } else { parts.join(", ") }
+}

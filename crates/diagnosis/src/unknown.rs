@@ -1,0 +1,166 @@
+//! What is left outside the catalogue: a smooth, free function of one measured signal in one
+//! module, as a Gaussian-process spline over hat functions, judged by the same evidence.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::drive::Drive;
+use crate::param::Theta;
+use crate::problem::{Column, Problem};
+use crate::replay::{Module, Prepared};
+use crate::stats::evidence;
+
+/// Knots of the spline.
+const KNOTS: usize = 9;
+/// Correlation length over the signal's range.
+const LENGTH: f64 = 0.3;
+
+/// A free-form extension that was found.
+#[derive(Debug, Clone)]
+pub(crate) struct Shape {
+    pub(crate) module: Module,
+    pub(crate) signal: &'static str,
+    /// Evidence over the present model, nats.
+    pub(crate) log_z: f64,
+    /// Signal at the knots and the module's error there.
+    pub(crate) knots: Vec<(f64, f64)>,
+    /// Part of the module's explainable excess that it takes.
+    pub(crate) explained_frac: f64,
+}
+
+type Read = fn(&Prepared, usize) -> f64;
+
+const SIGNALS: &[(&str, Read)] = &[
+    ("engine_speed_rpm", |d, i| d.rpm[i]),
+    ("speed_m_s", |d, i| d.speed[i]),
+    ("curvature_1_m", |d, i| d.curvature[i].abs()),
+    ("grade_frac", |d, i| d.grade[i]),
+    ("time_s", |_, i| i as f64 * Drive::STEP_S),
+    ("ambient_temp_degc", |d, i| d.ambient[i]),
+    ("coolant_temp_degc", |d, i| d.coolant[i]),
+    ("accelerator_pedal_frac", |d, i| d.pedal[i]),
+    ("brake_pressure_kpa", |d, i| d.pressure[i]),
+    ("gps_altitude_m", |d, i| d.altitude[i]),
+    ("gear", |d, i| d.gear[i] as f64),
+    ("engine_torque_percent", |d, i| d.torque[i]),
+    ("engine_brake_frac", |d, i| d.engine_brake[i]),
+    ("xbr_decel_m_s2", |d, i| d.xbr[i]),
+    ("yaw_rate_rad_s", |d, i| d.yaw[i]),
+    ("accel_y_m_s2", |d, i| d.accel_y[i]),
+    ("steering_wheel_rad", |d, i| d.steer[i]),
+];
+
+/// Modules that are searched, with the prior size of an unknown effect in the module's unit (per
+/// row). The force module's rows are accelerations over one second.
+const SEARCHED: &[(Module, f64)] = &[
+    (Module::Force, 0.03),
+    (Module::Torque, 2.0),
+    (Module::Brake, 10.0),
+    (Module::Fuel, 3.0),
+    (Module::Yaw, 0.003),
+    (Module::TrailerYaw, 0.003),
+    (Module::AccelY, 0.1),
+    (Module::Gps, 0.1),
+];
+
+/// Signals that the module itself writes, which its own noise would imitate.
+fn own(module: Module, signal: &str) -> bool {
+    module.quantity() == signal && module != Module::Force
+}
+
+impl Problem<'_> {
+    /// The best free-form functions at `theta`, one per module and signal, best first.
+    pub(crate) fn shapes(&self, theta: &Theta) -> Vec<Shape> {
+        let residuals: Vec<Column> =
+            (0..self.drives.len()).map(|i| self.whitened(i, theta)).collect();
+        let mut out = Vec::new();
+        for (module, size) in SEARCHED {
+            let m = *module as usize;
+            let rows: f64 = residuals.iter().map(|r| r[m].len() as f64).sum();
+            if !self.drives.iter().any(|d| d.available[m]) || rows < 100.0 {
+                continue;
+            }
+            for (signal, read) in SIGNALS {
+                if own(*module, signal) {
+                    continue;
+                }
+                if let Some(s) = self.shape(*module, *size, signal, *read, &residuals) {
+                    out.push(s);
+                }
+            }
+        }
+        out.sort_by(|a, b| b.log_z.total_cmp(&a.log_z));
+        out
+    }
+
+    fn shape(
+        &self,
+        module: Module,
+        size: f64,
+        signal: &'static str,
+        read: Read,
+        residuals: &[Column],
+    ) -> Option<Shape> {
+        let m = module as usize;
+        let step = module.row_step();
+        let value = |d: &Prepared, k: usize| {
+            let from = k * step;
+            let to = (from + step).min(d.n);
+            (from..to).map(|i| read(d, i)).sum::<f64>() / (to - from).max(1) as f64
+        };
+        let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
+        for d in &self.drives {
+            for (k, ok) in d.valid[m].iter().enumerate() {
+                if *ok {
+                    let x = value(d, k);
+                    lo = lo.min(x);
+                    hi = hi.max(x);
+                }
+            }
+        }
+        let width = (hi - lo) / (KNOTS - 1) as f64;
+        if width <= 1e-9 || !width.is_finite() {
+            return None;
+        }
+        let mut total = DMatrix::zeros(KNOTS + 1, KNOTS + 1);
+        for (i, d) in self.drives.iter().enumerate() {
+            let mut hats = vec![vec![0.0; d.valid[m].len()]; KNOTS];
+            for (k, ok) in d.valid[m].iter().enumerate() {
+                if *ok {
+                    let x = ((value(d, k) - lo) / width).clamp(0.0, (KNOTS - 1) as f64);
+                    let j = (x as usize).min(KNOTS - 2);
+                    hats[j][k] = 1.0 - (x - j as f64);
+                    hats[j + 1][k] = x - j as f64;
+                }
+            }
+            let mut columns = vec![residuals[i].clone()];
+            for h in &hats {
+                let mut c: Column = Default::default();
+                c[m] = self.reference.whiteners[m].apply(h, &d.valid[m]);
+                columns.push(c);
+            }
+            total += self.marginal(i, &columns);
+        }
+        let kernel = DMatrix::from_fn(KNOTS, KNOTS, |i, j| {
+            let x = (i as f64 - j as f64) / (KNOTS - 1) as f64 / LENGTH;
+            (-0.5 * x * x).exp() + if i == j { 1e-3 } else { 0.0 }
+        });
+        let factor = kernel.cholesky()?.l() * size;
+        let a = factor.transpose() * total.view((1, 1), (KNOTS, KNOTS)) * &factor;
+        let b: DVector<f64> =
+            factor.transpose() * total.view((1, 0), (KNOTS, 1)).column(0).into_owned();
+        let (log_z, w) = evidence::linear(&a, &b, &[1.0; KNOTS])?;
+        let f = &factor * &w;
+        let taken = 2.0 * b.dot(&w) - (&a * &w).dot(&w);
+        let rows: f64 =
+            self.drives.iter().map(|d| d.valid[m].iter().filter(|x| **x).count() as f64).sum();
+        let chi: f64 = residuals.iter().flat_map(|r| &r[m]).map(|x| x * x).sum();
+        let excess = (chi - rows).max(taken).max(1.0);
+        Some(Shape {
+            module,
+            signal,
+            log_z,
+            knots: (0..KNOTS).map(|k| (lo + k as f64 * width, f[k])).collect(),
+            explained_frac: (taken / excess).clamp(0.0, 1.0),
+        })
+    }
+}
