@@ -1,4 +1,5 @@
 //! The planning stack in the full truck, 55 t, not on rails: lane changes, curves, speed on grades.
+#![allow(clippy::unwrap_used)]
 
 use std::sync::Arc;
 
@@ -171,7 +172,8 @@ fn on_grades_of_three_per_cent_the_speed_stays_within_15_cm_per_s() {
         squares += error * error;
         count += 1.0;
         let c = &plan.command;
-        let now = match (c.accelerator_pedal_frac > 0.0, c.xbr_decel_m_s2 > 0.0) {
+        let braking = c.xbr_decel_m_s2 > 0.0 || c.retarder_frac > 0.0;
+        let now = match (c.accelerator_pedal_frac > 0.0, braking) {
             (true, _) => 1,
             (_, true) => 2,
             _ => last,

@@ -137,7 +137,12 @@ impl Gate {
             };
             concerns.push(Concern { role, neighbour: *n, safe });
         }
-        Self { concerns, extent, reaction_s: response.reaction_s, occupied }
+        Self {
+            concerns: nearest_of_each_role(concerns),
+            extent,
+            reaction_s: response.reaction_s,
+            occupied,
+        }
     }
 
     /// A vehicle is alongside in the target lane.
@@ -218,4 +223,22 @@ impl Gate {
         let too_soon = closing > 0.1 && gap < closing * strictness.time_to_collision_s;
         if too_close || too_soon { Err(refusal) } else { Ok(()) }
     }
+}
+
+/// The two nearest vehicles of each role: those beyond them cannot come closer without passing.
+fn nearest_of_each_role(mut concerns: Vec<Concern>) -> Vec<Concern> {
+    concerns.sort_by(|a, b| {
+        let near = |c: &Concern| match c.role {
+            Role::TargetBehind => -c.neighbour.front_s_m,
+            Role::TargetAhead | Role::OwnAhead => c.neighbour.rear_s_m,
+        };
+        near(a).total_cmp(&near(b))
+    });
+    let mut seen = [0; 3];
+    concerns.retain(|c| {
+        let count = &mut seen[c.role as usize];
+        *count += 1;
+        *count <= 2
+    });
+    concerns
 }

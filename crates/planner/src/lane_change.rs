@@ -169,7 +169,7 @@ pub struct Start<'a> {
 /// gate passes.
 ///
 /// # Errors
-/// Why none is driven: the gate's reason for the cheapest drivable course, or
+/// Why none is driven: the gate's reason for the cheapest course that it refuses, or
 /// [`LaneChangeRefusal::NoFeasiblePath`].
 pub fn plan_change(
     config: &LaneChangeConfig,
@@ -188,15 +188,15 @@ pub fn plan_change(
     let corridor = Corridor::new(start.road, start.path.lane, target);
     for course in courses(config, v, start.reference_speed_m_s) {
         let path = continued(start, target, course.at(course.duration_s).1);
-        let limits = (config.lateral_accel_max_m_s2, config.lateral_jerk_max_m_s3);
-        if !drivable(config, start, &path, &course, &corridor, limits) {
+        // The gate first: it usually answers within its first instant
+        if let Err(reason) = gate.check(&course, &path, start.road, start.ego.s_m, &config.entry())
+        {
+            refusal.get_or_insert(reason);
             continue;
         }
-        match gate.check(&course, &path, start.road, start.ego.s_m, &config.entry()) {
-            Ok(()) => return Ok(PlannedChange { path, course }),
-            Err(reason) => {
-                refusal.get_or_insert(reason);
-            }
+        let limits = (config.lateral_accel_max_m_s2, config.lateral_jerk_max_m_s3);
+        if drivable(config, start, &path, &course, &corridor, limits) {
+            return Ok(PlannedChange { path, course });
         }
     }
     Err(refusal.unwrap_or(LaneChangeRefusal::NoFeasiblePath))
