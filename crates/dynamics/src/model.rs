@@ -58,17 +58,10 @@ impl TruckModel {
             LateralModel::new(&parameters.lateral).map_err(|e| refuse(&name, e.to_string()))?;
         let engine =
             Engine::new(parameters.engine.clone()).map_err(|e| refuse(&name, e.to_string()))?;
-        let b = &parameters.brake;
-        let brake_table = if b.table_decel_m_s2.is_empty() {
-            None
-        } else {
-            let curve = Curve::new(
-                "table_pressure_pa",
-                b.table_decel_m_s2.clone(),
-                b.table_pressure_pa.clone(),
-            );
-            Some(curve.map_err(|e| refuse(&name, e.to_string()))?)
-        };
+        let brake_table = parameters
+            .brake
+            .pressure_table(parameters.lateral.total_mass_kg())
+            .map_err(|e| refuse(&name, e.to_string()))?;
         let axle_load_n = parameters.lateral.static_axle_load_n();
         let total: f64 = axle_load_n.iter().sum();
         let gears = parameters.driveline.gear_ratios.len() as u8;
@@ -115,6 +108,7 @@ impl TruckModel {
         let top = self.ratio_rad_m.len() - 1;
         let first = usize::from(self.parameters.driveline.launch_gear) - 1;
         let index = (first..=top).find(fits).unwrap_or(top);
+        let d = &self.parameters.driveline;
         let geared = speed_m_s * self.ratio_rad_m[index];
         let locked = geared > idle;
         TruckState {
@@ -128,7 +122,7 @@ impl TruckModel {
             engine_brake_nm: 0.0,
             retarder_nm: 0.0,
             clutch_locked: locked,
-            clutch_frac: if locked { 1.0 } else { 0.0 },
+            clutch_frac: if locked { 1.0 } else { -d.clutch_delay_s / d.clutch_closing_s },
             clutch_heat_j: 0.0,
             shift: ShiftState {
                 gear: index as u8 + 1,
@@ -213,20 +207,19 @@ impl TruckModel {
         let state = &mut s.shift;
         state.phase_s += SUBSTEP_S;
         state.since_shift_s += SUBSTEP_S;
+        let view = TcuView {
+            speed_m_s: s.speed_m_s,
+            pedal_frac: pedal,
+            retarder_frac: command.retarder_frac,
+            brake_decel_m_s2: decel,
+            power_w: (s.engine_torque_nm - self.engine.friction_nm(s.engine_speed_rad_s)).max(0.0)
+                * s.engine_speed_rad_s,
+            ratio_rad_m: &self.ratio_rad_m,
+            full_load_nm: &self.engine.full_load_nm,
+            max_rad_s: self.engine.max_rad_s,
+        };
         match state.phase {
             ShiftPhase::Engaged => {
-                let view = TcuView {
-                    speed_m_s: s.speed_m_s,
-                    pedal_frac: pedal,
-                    retarder_frac: command.retarder_frac,
-                    brake_decel_m_s2: decel,
-                    power_w: (s.engine_torque_nm - self.engine.friction_nm(s.engine_speed_rad_s))
-                        .max(0.0)
-                        * s.engine_speed_rad_s,
-                    ratio_rad_m: &self.ratio_rad_m,
-                    full_load_nm: &self.engine.full_load_nm,
-                    max_rad_s: self.engine.max_rad_s,
-                };
                 let wanted = self.wanted_gear(state, &view, command.gear);
                 if wanted != state.gear {
                     state.target = wanted;
@@ -236,6 +229,13 @@ impl TruckModel {
                 }
             }
             ShiftPhase::RampDown if state.phase_s >= p.phase_length_s(ShiftPhase::RampDown) => {
+                // a schedule by road speed is asked again: the truck went on while the torque fell
+                let again = p.wanted_gear(state, &view);
+                let same_way =
+                    again != state.gear && (again > state.gear) == (state.target > state.gear);
+                if p.speed_map.is_some() && same_way {
+                    state.target = again;
+                }
                 state.phase = ShiftPhase::Open;
                 state.phase_s = 0.0;
                 s.clutch_locked = false;
@@ -307,10 +307,8 @@ impl TruckModel {
             e.pedal_demand_nm(pedal, n, full_load_nm).min(full_load_nm + friction) * governor;
         let shift = &self.parameters.shift;
         demand *= shift.torque_frac(&s.shift);
-        if s.shift.phase == ShiftPhase::RampDown {
-            if let Some(floor) = shift.ramp_floor_nm {
-                demand = demand.min(floor);
-            }
+        if let (ShiftPhase::RampDown, Some(floor)) = (s.shift.phase, shift.ramp_floor_nm) {
+            demand = demand.min(floor);
         }
         let idle = holding + 6.0 * (e.idle_rad_s - n);
         let target =
@@ -363,9 +361,10 @@ impl TruckModel {
             return Wheel { drive_n: 0.0, gear: 0 };
         }
         let closing = if pedal > 0.01 { 1.0 } else { -2.0 };
-        s.clutch_frac = (s.clutch_frac + closing * SUBSTEP_S / d.clutch_closing_s).clamp(0.0, 1.0);
+        s.clutch_frac = (s.clutch_frac + closing * SUBSTEP_S / d.clutch_closing_s)
+            .clamp(-d.clutch_delay_s / d.clutch_closing_s, 1.0);
         let held = crank_nm.max(0.0) + 15.0 * (n - self.engine.idle_rad_s);
-        let passed = held.clamp(0.0, s.clutch_frac * d.clutch_torque_nm);
+        let passed = held.clamp(0.0, s.clutch_frac.max(0.0) * d.clutch_torque_nm);
         s.engine_speed_rad_s =
             (n + SUBSTEP_S * (crank_nm - passed) / inertia).max(0.5 * self.engine.idle_rad_s);
         s.clutch_heat_j += passed * (n - geared).max(0.0) * SUBSTEP_S;

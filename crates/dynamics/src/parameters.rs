@@ -18,9 +18,10 @@ use crate::effects::resistance::ResistanceParameters;
 use crate::effects::shift::ShiftParameters;
 use crate::lateral::LateralParameters;
 
-const BUILTIN: [(&str, &str); 2] = [
+const BUILTIN: [(&str, &str); 3] = [
     ("sinotruk", include_str!("../trucks/sinotruk.toml")),
     ("reference", include_str!("../trucks/reference.toml")),
+    ("iits", include_str!("../trucks/iits.toml")),
 ];
 
 /// A truck file.

@@ -11,6 +11,7 @@
 //! at the adhesion limit. Filling takes air from the reservoir; an empty one limits the pressure.
 
 use serde::{Deserialize, Serialize};
+use tractrix_core::{CoreError, Curve, Grid};
 
 use crate::bounds::Bounds;
 
@@ -31,9 +32,12 @@ pub struct BrakeParameters {
     /// Deceleration demands of the pressure table, m/s²; empty = pressure from mass and K.
     #[serde(default)]
     pub table_decel_m_s2: Vec<f64>,
-    /// Pressures of the table, Pa.
+    /// Masses of the table, kg: the load-dependent distribution.
     #[serde(default)]
-    pub table_pressure_pa: Vec<f64>,
+    pub table_mass_kg: Vec<f64>,
+    /// Pressures of the table, Pa: one row per mass, one value per deceleration.
+    #[serde(default)]
+    pub table_pressure_pa: Vec<Vec<f64>>,
     /// Largest pressure, Pa.
     pub max_pressure_pa: f64,
     /// Dead time from demand to pressure, s.
@@ -91,9 +95,7 @@ impl BrakeParameters {
         let mut b = Bounds::of("brake");
         b.within("gain_n_pa", self.gain_n_pa, 0.01, 10.0);
         b.within("gain_scale_coeff", self.gain_scale_coeff, 0.05, 3.0);
-        if !self.table_decel_m_s2.is_empty() || !self.table_pressure_pa.is_empty() {
-            b.curve("table_pressure_pa", &self.table_decel_m_s2, &self.table_pressure_pa);
-        }
+        b.result("table_pressure_pa", self.pressure_table(0.0).map(|_| ()));
         b.within("max_pressure_pa", self.max_pressure_pa, 1e5, 2e6);
         b.within("dead_time_s", self.dead_time_s, 0.0, crate::state::MAX_DELAY_S);
         b.within("lag_s", self.lag_s, 0.005, 2.0);
@@ -108,14 +110,21 @@ impl BrakeParameters {
         b.violations
     }
 
+    /// The pressure table at a mass: pressure (Pa) over deceleration (m/s²). `None` without one.
+    pub(crate) fn pressure_table(&self, mass_kg: f64) -> Result<Option<Curve>, CoreError> {
+        let (x, y) = (&self.table_mass_kg, &self.table_decel_m_s2);
+        if x.is_empty() && y.is_empty() && self.table_pressure_pa.is_empty() {
+            return Ok(None);
+        }
+        let rows = self.table_pressure_pa.iter().flatten().copied().collect();
+        let grid = Grid::new("table_pressure_pa", x.clone(), y.clone(), rows)?;
+        let at_mass = y.iter().map(|&a| grid.at(mass_kg, a)).collect();
+        Curve::new("table_pressure_pa", y.clone(), at_mass).map(Some)
+    }
+
     /// Mean pressure that a deceleration demand asks for, Pa.
     #[must_use]
-    pub fn demand_pa(
-        &self,
-        decel_m_s2: f64,
-        mass_kg: f64,
-        table: Option<&tractrix_core::Curve>,
-    ) -> f64 {
+    pub fn demand_pa(&self, decel_m_s2: f64, mass_kg: f64, table: Option<&Curve>) -> f64 {
         let p = match table {
             Some(curve) if decel_m_s2 > 0.0 => curve.at(decel_m_s2),
             _ => mass_kg * decel_m_s2.max(0.0) / self.gain_n_pa,

@@ -34,6 +34,9 @@ pub struct DrivelineParameters {
     pub clutch_torque_nm: f64,
     /// Time to close the clutch on launch, s.
     pub clutch_closing_s: f64,
+    /// Time from the pedal to the clutch's touch point on launch, s.
+    #[serde(default)]
+    pub clutch_delay_s: f64,
     /// Gear for pulling away.
     pub launch_gear: u8,
     /// Secondary retarder: largest torque at the propeller shaft, Nm.
@@ -75,6 +78,7 @@ impl DrivelineParameters {
         b.within("wheel_inertia_kg_m2", self.wheel_inertia_kg_m2, 0.0, 2_000.0);
         b.within("clutch_torque_nm", self.clutch_torque_nm, 100.0, 20_000.0);
         b.within("clutch_closing_s", self.clutch_closing_s, 0.05, 10.0);
+        b.within("clutch_delay_s", self.clutch_delay_s, 0.0, 5.0);
         b.within("launch_gear", f64::from(self.launch_gear), 1.0, n.max(1) as f64);
         b.within("retarder_torque_nm", self.retarder_torque_nm, 0.0, 10_000.0);
         b.within("retarder_power_w", self.retarder_power_w, 0.0, 1e6);
