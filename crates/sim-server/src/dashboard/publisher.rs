@@ -19,7 +19,6 @@ pub(crate) struct Publisher {
     provenance: Provenance,
     scenario: String,
     road: Arc<Road>,
-    wanted: bool,
     snapshot: Option<Snapshot>,
     /// Wall and simulated seconds of an earlier frame, for the factor.
     mark: (f64, f64),
@@ -51,19 +50,13 @@ impl Publisher {
             provenance,
             scenario,
             road,
-            wanted: false,
             snapshot: None,
             mark: (0.0, 0.0),
             realtime_factor: 0.0,
         }
     }
 
-    /// Says whether the next tick is to be kept for a frame.
-    pub(crate) const fn want_snapshot(&mut self, wanted: bool) {
-        self.wanted = wanted;
-    }
-
-    /// Publishes the kept tick with the run's state.
+    /// Publishes the last tick with the run's state.
     pub(crate) fn publish(
         &mut self,
         state: RunState,
@@ -104,13 +97,11 @@ impl Publisher {
 
 impl Recorder for Publisher {
     fn record(&mut self, tick: &Tick<'_>) {
-        if self.wanted {
-            let kept = self.snapshot.get_or_insert_default();
-            kept.now = tick.now;
-            kept.ego = *tick.ego;
-            kept.plan.clone_from(tick.plan);
-            kept.scene.clone_from(tick.scene);
-        }
+        let kept = self.snapshot.get_or_insert_default();
+        kept.now = tick.now;
+        kept.ego = *tick.ego;
+        kept.plan.clone_from(tick.plan);
+        kept.scene.clone_from(tick.scene);
         let mut strip = self.shared.strip();
         if strip.is_due(tick.ego.s_m) {
             strip.push(tick);

@@ -170,9 +170,6 @@ impl Drive {
 
     fn tick(&mut self) -> Result<Status, Failure> {
         let began = self.start.elapsed();
-        if let Some(publisher) = &mut self.job.publisher {
-            publisher.want_snapshot(began >= self.frame_due);
-        }
         let mut sinks =
             Sinks { recording: &mut self.job.recording, publisher: self.job.publisher.as_mut() };
         let status = self.job.world.tick(&mut sinks);

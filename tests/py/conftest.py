@@ -1,0 +1,45 @@
+"""Where the program is, and a run of it for all tests that only read its files."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+WORKSPACE = Path(__file__).resolve().parents[2]
+
+
+def find_server() -> Path:
+    """The release binary that cargo built."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", WORKSPACE / "target"))
+    return target / "release" / "sim-server"
+
+
+@pytest.fixture(scope="session")
+def server() -> Path:
+    """The program; tests are skipped where it has not been built."""
+    program = find_server()
+    if not program.exists():
+        pytest.skip(f"{program} does not exist: cargo build --release -p sim-server")
+    return program
+
+
+@pytest.fixture(scope="session")
+def short_run(server: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a run of 20 simulated seconds."""
+    folder = tmp_path_factory.mktemp("short_run")
+    command: list[str | Path] = [
+        server,
+        "run",
+        "--headless",
+        "--duration",
+        "20",
+        "--seed",
+        "7",
+        "--out",
+        folder,
+    ]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    return folder
