@@ -18,6 +18,8 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Drives a scenario in closed loop: the main job.
     Run(Box<cmd::run::Args>),
+    /// Plans the fuel-optimal speed of a whole trip, against cruise control.
+    Plan(Box<cmd::plan::Args>),
     /// Checks road maps.
     #[command(subcommand)]
     Map(cmd::map::Command),

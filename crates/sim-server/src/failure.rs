@@ -24,6 +24,11 @@ impl Failure {
         Self::Work(error.to_string())
     }
 
+    /// Failed work on a file, with all causes of the error.
+    pub(crate) fn work_on(path: &Path, error: &dyn std::error::Error) -> Self {
+        Self::Work(format!("{}: {}", path.display(), with_causes(error)))
+    }
+
     /// A file that the user named cannot be read or written.
     pub(crate) fn file(path: &Path, error: impl std::fmt::Display) -> Self {
         Self::Input(format!("{}: {error}", path.display()))
@@ -51,4 +56,16 @@ impl Failure {
 /// Folds line breaks and indentation into single spaces.
 pub(crate) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// An error's message and those of its causes.
+fn with_causes(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(inner) = cause {
+        text.push_str(": ");
+        text.push_str(&inner.to_string());
+        cause = inner.source();
+    }
+    text
 }

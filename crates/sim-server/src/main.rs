@@ -10,6 +10,7 @@ mod dashboard;
 mod driver;
 mod failure;
 mod output;
+mod picture;
 mod progress;
 mod provenance;
 mod recording;

@@ -1,7 +1,12 @@
 //! `map check ROAD`: what the importer makes of a map.
 
+mod carriageway;
+
+use std::collections::BTreeMap;
+
 use clap::{Parser, Subcommand};
-use road::{LaneKind, Road};
+use road::Road;
+use road::opendrive::{MapReport, Network, RecordCount};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -11,7 +16,7 @@ use crate::provenance::Provenance;
 /// Road maps.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Imports a map and reports lanes, length, grade range and jumps.
+    /// Imports a map; reports lanes, length, grade range, jumps and unsupported records.
     Check(Args),
 }
 
@@ -25,170 +30,82 @@ pub(crate) struct Args {
     json: bool,
 }
 
-/// What the importer made of a map.
-#[derive(Debug, Serialize)]
-struct Report {
+/// A map's report with its provenance.
+#[derive(Serialize)]
+struct MapJson {
     #[serde(flatten)]
     provenance: Provenance,
-    road: String,
-    length_m: f64,
-    lanes: Vec<Lane>,
-    grade_frac: Range,
-    bank_rad: Range,
-    curvature_1_m: Range,
-    height_m: Range,
-    /// Sum of all rises, m.
-    climb_m: f64,
-    speed_limit_m_s: Range,
-    objects: usize,
-    jumps: Vec<Jump>,
+    #[serde(flatten)]
+    report: MapReport,
 }
 
-/// One lane track.
-#[derive(Debug, Serialize)]
-struct Lane {
-    id: u16,
-    kind: &'static str,
-    s_start_m: f64,
-    s_end_m: f64,
-    width_m: Range,
-}
-
-/// Smallest and largest value.
-#[derive(Debug, Clone, Copy, Serialize)]
-struct Range {
-    min: f64,
-    max: f64,
-}
-
-impl Range {
-    fn of(values: impl Iterator<Item = f64>) -> Self {
-        values.fold(Self { min: f64::INFINITY, max: f64::NEG_INFINITY }, |r, v| Self {
-            min: r.min.min(v),
-            max: r.max.max(v),
-        })
-    }
-}
-
-/// A step where two elements meet.
-#[derive(Debug, Serialize)]
-struct Jump {
-    s_m: f64,
-    gap_m: f64,
-    height_m: f64,
-    heading_rad: f64,
-    grade_frac: f64,
-}
-
-/// Distance between two samples, m.
-const STEP_M: f64 = 1.0;
-/// Steps below these are rounding of the file: position and height m, heading rad, grade.
-const TOLERANCE: [f64; 3] = [1e-3, 1e-4, 1e-3];
-
+/// Runs the command.
 pub(crate) fn run(command: Command) -> Result<(), Failure> {
     let Command::Check(args) = command;
-    let road = Road::load(&args.road).map_err(Failure::input)?;
-    let report = inspect(&args.road, &road);
-    if args.json {
-        output::result(&serde_json::to_string(&report).map_err(Failure::work)?);
+    let (json, text) = if args.road.to_ascii_lowercase().ends_with(".xodr") {
+        let report = Network::load(&args.road).map_err(Failure::input)?.check();
+        let text = text(&report);
+        let json = MapJson { provenance: Provenance::of_seed(0), report };
+        (serde_json::to_string(&json), text)
     } else {
-        output::result(&text(&report));
-    }
+        let road = Road::load(&args.road).map_err(Failure::input)?;
+        let report = carriageway::inspect(&args.road, &road);
+        (serde_json::to_string(&report), carriageway::text(&report))
+    };
+    output::result(if args.json { json.map_err(Failure::work)? } else { text }.as_str());
     Ok(())
 }
 
-fn inspect(name: &str, road: &Road) -> Report {
-    let count = (road.length_m() / STEP_M).floor().max(0.0) as usize;
-    let points: Vec<_> = (0..=count).map(|i| road.at(i as f64 * STEP_M, 0.0)).collect();
-    let height = |i: usize| points[i].z_m;
-    let lanes = road.lanes().iter().map(|lane| Lane {
-        id: lane.id,
-        kind: match lane.kind {
-            LaneKind::Driving => "driving",
-            LaneKind::Entry => "entry",
-            LaneKind::Exit => "exit",
-            LaneKind::Shoulder => "shoulder",
-        },
-        s_start_m: lane.s_start_m,
-        s_end_m: lane.s_end_m,
-        width_m: Range::of((0..=100).map(|i| {
-            lane.width_m(lane.s_start_m + (lane.s_end_m - lane.s_start_m) * f64::from(i) * 0.01)
-        })),
-    });
-    Report {
-        provenance: Provenance::of_seed(0),
-        road: name.to_owned(),
-        length_m: road.length_m(),
-        lanes: lanes.collect(),
-        grade_frac: Range::of(points.iter().map(|p| p.grade_rad.tan())),
-        bank_rad: Range::of(points.iter().map(|p| p.bank_rad)),
-        curvature_1_m: Range::of(points.iter().map(|p| p.curvature_1_m)),
-        height_m: Range::of(points.iter().map(|p| p.z_m)),
-        climb_m: (1..points.len()).map(|i| (height(i) - height(i - 1)).max(0.0)).sum(),
-        speed_limit_m_s: Range::of(road.speed_limits().iter().map(|l| l.1)),
-        objects: road.objects().len(),
-        jumps: jumps(road),
-    }
-}
-
-/// Steps of the reference line where its elements meet.
-fn jumps(road: &Road) -> Vec<Jump> {
-    const ASIDE_M: f64 = 1e-6;
-    let joints = road.line().joints_m().filter(|s| *s > ASIDE_M && *s < road.length_m() - ASIDE_M);
-    joints
-        .map(|s_m| {
-            let (a, b) = (road.at(s_m - ASIDE_M, 0.0), road.at(s_m + ASIDE_M, 0.0));
-            Jump {
-                s_m,
-                gap_m: (b.x_m - a.x_m).hypot(b.y_m - a.y_m),
-                height_m: (b.z_m - a.z_m).abs(),
-                heading_rad: (b.heading_rad - a.heading_rad).abs(),
-                grade_frac: (b.grade_rad.tan() - a.grade_rad.tan()).abs(),
-            }
-        })
-        .filter(|j| {
-            let [length, heading, grade] = TOLERANCE;
-            j.gap_m > length
-                || j.height_m > length
-                || j.heading_rad > heading
-                || j.grade_frac > grade
-        })
-        .collect()
-}
-
-fn text(r: &Report) -> String {
+fn text(r: &MapReport) -> String {
+    let range = |[low, high]: [f64; 2], unit: &str| format!("{low:.2} to {high:.2} {unit}");
     let mut lines = vec![
-        format!("{}: {:.1} m, {} objects", r.road, r.length_m, r.objects),
         format!(
-            "grade {:+.2} to {:+.2} %, height {:.1} to {:.1} m, climb {:.1} m",
-            100.0 * r.grade_frac.min,
-            100.0 * r.grade_frac.max,
-            r.height_m.min,
-            r.height_m.max,
-            r.climb_m
+            "{}: OpenDRIVE {}, {} roads, {} junctions, {:.1} m of road, {:.1} m of drivable lane",
+            r.file, r.revision, r.roads, r.junctions, r.length_m, r.drivable_lane_m
+        ),
+        match (r.route_length_m, r.route_lanes) {
+            (Some(length_m), Some(lanes)) => {
+                format!("default route: {length_m:.1} m, {lanes} lane tracks")
+            }
+            _ => "default route: none, nothing can be driven".to_owned(),
+        },
+        format!(
+            "grade {}, height {}, bank {}",
+            range(r.grade_frac.map(|g| 100.0 * g), "%"),
+            range(r.elevation_m, "m"),
+            range(r.bank_rad, "rad"),
         ),
         format!(
-            "curvature {:+.5} to {:+.5} 1/m, bank {:+.3} to {:+.3} rad, limits {:.1} to {:.1} m/s",
-            r.curvature_1_m.min,
-            r.curvature_1_m.max,
-            r.bank_rad.min,
-            r.bank_rad.max,
-            r.speed_limit_m_s.min,
-            r.speed_limit_m_s.max
+            "tightest radius {}, speed limits {}",
+            r.min_radius_m.map_or("none (straight)".to_owned(), |m| format!("{m:.1} m")),
+            r.speed_limit_m_s.map_or("none".to_owned(), |limits| range(limits, "m/s")),
         ),
+        format!("lanes: {}", counts(&r.lanes)),
+        format!("objects and signals: {}", counts(&r.objects)),
+        format!("unsupported: {}", records(&r.unsupported)),
+        format!("ignored: {}", records(&r.ignored)),
     ];
-    lines.extend(r.lanes.iter().map(|l| {
-        format!(
-            "lane {:2} {:8} {:9.1} to {:9.1} m, {:.2} to {:.2} m wide",
-            l.id, l.kind, l.s_start_m, l.s_end_m, l.width_m.min, l.width_m.max
-        )
-    }));
-    lines.push(format!("{} jumps", r.jumps.len()));
+    lines.extend(r.broken_links.iter().map(|link| format!("broken link: {link}")));
+    let jumps: usize = r.jump_counts.values().sum();
+    lines.push(format!("{jumps} jumps"));
     lines.extend(r.jumps.iter().map(|j| {
-        format!(
-            "jump at {:.2} m: {:.4} m sideways, {:.4} m in height, {:.5} rad, {:.4} in grade",
-            j.s_m, j.gap_m, j.height_m, j.heading_rad, j.grade_frac
-        )
+        let to = j.to_road.as_ref().map_or(String::new(), |id| format!(" to road {id}"));
+        let kind = serde_json::to_string(&j.kind).unwrap_or_default();
+        let kind = kind.trim_matches('"');
+        format!("  {kind} {:.4} on road {} at {:.2} m{to}", j.size, j.road, j.s_m)
     }));
     lines.join("\n")
+}
+
+fn counts(map: &BTreeMap<String, usize>) -> String {
+    let items: Vec<String> = map.iter().map(|(name, count)| format!("{count} {name}")).collect();
+    if items.is_empty() { "none".to_owned() } else { items.join(", ") }
+}
+
+fn records(map: &BTreeMap<String, RecordCount>) -> String {
+    let item = |(name, r): (&String, &RecordCount)| {
+        format!("{} {name} (first in line {})", r.count, r.first_line)
+    };
+    let items: Vec<String> = map.iter().map(item).collect();
+    if items.is_empty() { "none".to_owned() } else { items.join(", ") }
 }

@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub(crate) mod map;
+pub(crate) mod plan;
 pub(crate) mod recover;
 pub(crate) mod run;
 pub(crate) mod scenario;
@@ -15,6 +16,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
     match cli.command {
         None => run::run(&run::Args::parse_from(["run"])),
         Some(Command::Run(args)) => run::run(&args),
+        Some(Command::Plan(args)) => plan::run(&args),
         Some(Command::Map(command)) => map::run(command),
         Some(Command::Recover(args)) => recover::run(&args),
         Some(Command::Scenario(command)) => scenario::run(&command),

@@ -5,18 +5,15 @@ use std::sync::LazyLock;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
+use crate::picture::plotly_js;
+
 const HTML: &str = include_str!("page/index.html");
 const STYLE: &str = include_str!("page/style.css");
 const APP: &str = include_str!("page/app.js");
 const VIEW: &str = include_str!("page/view.js");
 const STRIPS: &str = include_str!("page/strips.js");
 
-/// Plotly.js as the crate `plotly` ships it: the first of its script elements.
-static PLOTLY: LazyLock<String> = LazyLock::new(|| {
-    let sources = plotly::Plot::offline_js_sources();
-    let script = sources.split_once('>').map_or("", |(_, rest)| rest);
-    script.split("</script>\n").next().unwrap_or_default().to_owned()
-});
+static PLOTLY: LazyLock<String> = LazyLock::new(plotly_js);
 
 /// One embedded file by its path; none if there is no such file.
 pub(super) fn asset(path: &str) -> Option<Response> {
@@ -35,15 +32,3 @@ pub(super) fn asset(path: &str) -> Option<Response> {
 }
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn plotly_is_the_whole_library_and_nothing_else() {
-        assert!(PLOTLY.len() > 1_000_000);
-        assert!(!PLOTLY.contains("<script"), "no second script element");
-        assert!(PLOTLY.contains("plotly.js v"));
-    }
-}

@@ -117,14 +117,19 @@ impl McapFile {
 
     /// Writes the summary section; the file is whole after it.
     pub(super) fn finish(mut self) -> Result<(), Failure> {
-        let path = self.path.clone();
-        let failed = |e: &dyn std::fmt::Display| Failure::Work(format!("{}: {e}", path.display()));
-        self.writer.finish().map_err(|e| failed(&e))?;
-        let file = self.writer.into_inner().into_inner().map_err(|e| failed(&e))?;
-        file.sync_all().map_err(|e| failed(&e))
+        self.writer.finish().map_err(|e| Failure::work_on(&self.path, &e))?;
+        let file = self.writer.into_inner().into_inner();
+        let file = file.map_err(|e| Failure::work_on(&self.path, e.error()))?;
+        match file.sync_all() {
+            // A pipe or device has nothing to sync.
+            Err(e) if e.kind() != std::io::ErrorKind::InvalidInput => {
+                Err(Failure::work_on(&self.path, &e))
+            }
+            _ => Ok(()),
+        }
     }
 
-    fn failed(&self, error: impl std::fmt::Display) -> Failure {
-        Failure::Work(format!("{}: recording failed: {error}", self.path.display()))
+    fn failed(&self, error: impl std::error::Error) -> Failure {
+        Failure::work_on(&self.path, &error)
     }
 }

@@ -43,7 +43,7 @@ pub(crate) fn recover(path: &Path) -> Result<Recovered, Failure> {
     }
     let target = path.with_extension("recovered.mcap");
     let output = File::create_new(&target).map_err(|e| Failure::file(&target, e))?;
-    let failed = |e: mcap::McapError| Failure::Work(format!("{}: {e}", target.display()));
+    let failed = |e: mcap::McapError| Failure::work_on(&target, &e);
     let writer = write_options().create(BufWriter::new(output)).map_err(failed)?;
     let mut copy = Copy { writer, kept: Recovered { file: target.clone(), ..Default::default() } };
     loop {

@@ -189,9 +189,10 @@ fn finish(
     if let Some(publisher) = &ended.publisher {
         publisher.publish_summary(&json);
     }
-    ended.recording.finish(&json)?;
+    let recorded = ended.recording.finish(&json);
     let path = folder.join("summary.json");
-    std::fs::write(&path, &json).map_err(|e| Failure::Work(format!("{}: {e}", path.display())))?;
+    std::fs::write(&path, &json).map_err(|e| Failure::work_on(&path, &e))?;
+    recorded?;
     match ended.failure {
         Some(failure) => Err(failure),
         None => Ok((summary, json)),

@@ -168,9 +168,11 @@ export class BirdView {
     if (xy.length < 4) return;
     const points = [];
     for (let i = 0; i < xy.length; i += 2) points.push(this.px(xy[i], xy[i + 1]));
-    const front = this.px(ego.x_m, ego.y_m)[0];
-    const visible = points.filter((p) => p[0] >= front);
-    if (visible.length < 2) return;
+    const reach = this.road.truck.tractor_front_m;
+    const nose = this.px(ego.x_m + reach * Math.cos(ego.yaw_rad), ego.y_m + reach * Math.sin(ego.yaw_rad));
+    const front = nose[0];
+    const visible = [nose, ...points.filter((p) => p[0] > front + 2)];
+    if (visible.length < 3) return;
     const end = visible[visible.length - 1];
     const fade = ctx.createLinearGradient(front, 0, Math.max(front + 1, end[0]), 0);
     fade.addColorStop(0, COLOR.path);

@@ -1,0 +1,129 @@
+//! Bad input gets one clear line on stderr, exit code 2, nothing on stdout, and nothing is lost.
+
+mod support;
+
+use std::net::TcpListener;
+use std::path::Path;
+
+use support::{refused, scenario_with, server};
+
+#[test]
+fn an_unknown_flag_is_named() {
+    assert!(refused(&["run", "--sede", "3"]).contains("--sede"));
+    assert!(refused(&["fly"]).contains("fly"));
+}
+
+#[test]
+fn numbers_that_are_no_numbers_are_refused_with_their_flag() {
+    for (flag, value) in
+        [("--duration", "NaN"), ("--duration", "-5"), ("--pace", "fast"), ("--payload-kg", "inf")]
+    {
+        let flag_value = format!("{flag}={value}");
+        let line = refused(&["run", "--headless", &flag_value]);
+        assert!(line.contains(flag) && line.contains(value), "{line}");
+    }
+    assert!(refused(&["run", "--headless", "--port", "99999"]).contains("99999"));
+}
+
+#[test]
+fn what_the_contract_names_and_this_version_lacks_says_so() {
+    for option in [
+        &["--vehicle", "bus"][..],
+        &["--vehicle", "can:can0"],
+        &["--vehicle", "socketcand:localhost:29536/can0"],
+        &["--ros2"],
+        &["--foxglove"],
+        &["--decider", "external"],
+        &["--decider", "dqn:policy.safetensors"],
+    ] {
+        let line = refused(&[&["run", "--headless"], option].concat());
+        assert!(line.contains("not supported"), "{option:?}: {line}");
+    }
+    assert!(refused(&["run", "--headless", "--decider", "rules:near"]).contains("rules:near"));
+    assert!(refused(&["run", "--headless", "--decider", "rules:-3"]).contains("-3"));
+}
+
+#[test]
+fn a_wrong_key_in_a_scenario_is_named_with_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, named) in [
+        ("speed_limit_kmh = 80\n", "speed_limit_kmh"),
+        ("[ego]\nspeed_km_h = 72.0\n", "speed_km_h"),
+        ("[ego]\nspeed_m_s = nan\n", "ego.speed_m_s"),
+        ("[run]\ntick_s = 0.0\n", "run.tick_s"),
+        ("[stack]\ndecider = \"psychic\"\n", "psychic"),
+        ("[weather\n", "line"),
+    ] {
+        let file = scenario_with(folder.path(), text);
+        let line = refused(&["run", &file, "--headless"]);
+        assert!(line.contains(named) && line.contains("scenario.toml"), "{text}: {line}");
+    }
+}
+
+#[test]
+fn missing_and_malformed_files_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    assert!(refused(&["run", &path("none.toml")]).contains("none.toml"));
+    assert!(refused(&["run", "no-such-scenario"]).contains("highway"), "lists what there is");
+    assert!(refused(&["run", "--headless", "--truck", "no-such-truck"]).contains("no-such-truck"));
+    assert!(refused(&["recover", &path("none.mcap")]).contains("none.mcap"));
+    assert!(refused(&["scenario", "show", "nowhere"]).contains("nowhere"));
+
+    std::fs::write(path("torn.xodr"), "<OpenDRIVE><road length=\"abc\"").unwrap();
+    for command in [&["map", "check"][..], &["run", "--headless", "--road"]] {
+        let line = refused(&[command, &[&*path("torn.xodr")]].concat());
+        assert!(line.contains("torn.xodr"), "{line}");
+    }
+    std::fs::write(path("road.csv"), "s_m,height\n0,1\n").unwrap();
+    assert!(refused(&["map", "check", &path("road.csv")]).contains("road.csv"));
+    std::fs::write(path("text.mcap"), "not a recording").unwrap();
+    assert!(refused(&["recover", &path("text.mcap")]).contains("text.mcap"));
+}
+
+#[test]
+fn a_plan_needs_a_truck_of_at_least_its_empty_mass_and_a_sensible_band() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("plan").display().to_string();
+    let plan = |mass: &'static str, lowest: &'static str| {
+        let fixed = ["plan", "--truck", "sinotruk", "--road", "builtin:flat", "--out", &out];
+        let speeds = ["--set-speed-m-s", "20", "--speed-max-m-s", "22", "--speed-min-m-s", lowest];
+        refused(&[&fixed[..], &speeds[..], &["--mass-kg", mass]].concat())
+    };
+    assert!(plan("5000", "15").contains("without payload"));
+    assert!(plan("NaN", "15").contains("--mass-kg"));
+    assert!(plan("40000", "21").contains("speed_min_m_s"));
+    assert!(!Path::new(&out).exists(), "nothing is written for a plan that cannot be made");
+}
+
+#[test]
+fn a_port_in_use_is_reported_before_anything_is_written() {
+    #[expect(clippy::disallowed_methods, reason = "the test occupies a port")]
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port().to_string();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let line = refused(&["run", "--port", &port, "--out", &out.display().to_string()]);
+    assert!(line.contains(&port) && line.contains("in use"), "{line}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("file");
+    std::fs::write(&file, "in the way").unwrap();
+    let out = file.join("out").display().to_string();
+    assert!(refused(&["run", "--headless", "--out", &out]).contains(&out));
+}
+
+#[test]
+fn recover_does_not_overwrite() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().display().to_string();
+    let run = server(&["run", "--headless", "--duration", "1", "--out", &out]);
+    assert!(run.status.success());
+    let file = folder.path().join("run.mcap").display().to_string();
+    assert!(server(&["recover", &file]).status.success());
+    assert!(refused(&["recover", &file]).contains("run.recovered.mcap"));
+}
