@@ -1,0 +1,73 @@
+//! Bad input gives a clear error or a finding, never a panic.
+
+use std::path::Path;
+
+use diagnosis::{Action, Channel, DiagnosisError, DriveSet, FindingKind, read_drives};
+
+fn folder(rows: impl Iterator<Item = (f64, f64, String)>) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let mut csv = "time_s,speed_m_s,gps_speed_m_s,accelerator_pedal_frac\n".to_owned();
+    for (t, v, pedal) in rows {
+        csv += &format!("{t},{v},{},{pedal}\n", v + 0.01);
+    }
+    write(dir.path(), "d.csv", &csv);
+    write(
+        dir.path(),
+        "drives.toml",
+        "schema = 1\ntruck = \"reference\"\n[[drive]]\nname = \"d\"\nfile = \"d.csv\"\n",
+    );
+    dir
+}
+
+fn write(dir: &Path, name: &str, text: &str) {
+    std::fs::write(dir.join(name), text).unwrap();
+}
+
+fn speed(t: f64) -> f64 {
+    15.0 + 5.0 * (0.1 * t).sin()
+}
+
+fn drive(pedal: impl Fn(usize) -> String) -> Result<DriveSet, DiagnosisError> {
+    let dir = folder((0..2400).map(|i| (i as f64 * 0.05, speed(i as f64 * 0.05), pedal(i))));
+    read_drives(dir.path())
+}
+
+#[test]
+fn a_pedal_in_percent_is_converted_and_said_so() {
+    let set = drive(|_| "40".to_owned()).unwrap();
+    let pedal = set.drives[0].get(Channel::AcceleratorPedalFrac).unwrap();
+    assert!((pedal[100] - 0.4).abs() < 1e-12);
+    assert!(set.findings.iter().any(|f| matches!(f.kind, FindingKind::WrongUnit { .. })));
+}
+
+#[test]
+fn a_channel_that_is_mostly_missing_is_dropped_with_a_finding() {
+    let set = drive(|i| if i % 3 == 0 { "0.4".to_owned() } else { String::new() }).unwrap();
+    assert!(!set.drives[0].has(Channel::AcceleratorPedalFrac));
+    assert!(set.findings.iter().any(|f| f.action == Action::ChannelDropped));
+}
+
+#[test]
+fn shuffled_rows_are_refused_with_the_row() {
+    let dir = folder((0..2400).map(|i| {
+        let t = if i == 700 { 3.0 } else { i as f64 * 0.05 };
+        (t, speed(t), "0.4".to_owned())
+    }));
+    let e = read_drives(dir.path()).unwrap_err();
+    assert!(matches!(e, DiagnosisError::ShuffledTime { row: 700, .. }), "{e}");
+}
+
+#[test]
+fn one_sample_is_too_short() {
+    let dir = folder(std::iter::once((0.0, 10.0, "0.1".to_owned())));
+    assert!(matches!(read_drives(dir.path()), Err(DiagnosisError::TooShort { .. })));
+}
+
+#[test]
+fn an_empty_table_and_a_missing_index_are_errors() {
+    assert!(read_drives(folder(std::iter::empty()).path()).is_err());
+    assert!(matches!(
+        read_drives(tempfile::tempdir().unwrap().path()),
+        Err(DiagnosisError::Io { .. })
+    ));
+}
