@@ -160,7 +160,7 @@ fn on_grades_of_three_per_cent_the_speed_stays_within_15_cm_per_s() {
     let truck = truck(&road, set);
     let mut vehicle = Misinformed { told: truck.limits().clone(), truck };
     let config = StackConfig { set_speed_m_s: set, ..StackConfig::default() };
-    let (mut squares, mut count, mut switches, mut last) = (0.0, 0.0, 0, 0);
+    let (mut squares, mut count, mut switches, mut last) = (0.0_f64, 0.0_f64, 0, 0);
     let (mut from, mut to) = (0.0, 0.0);
     drive(&road, config, &mut vehicle, 640.0, None, |time_s, ego, plan| {
         if time_s < 30.0 {
@@ -181,7 +181,7 @@ fn on_grades_of_three_per_cent_the_speed_stays_within_15_cm_per_s() {
         switches += i32::from(now != last && last != 0);
         last = now;
     });
-    let rms = (squares / count as f64).sqrt();
+    let rms = (squares / count).sqrt();
     let per_km = f64::from(switches) / (to - from) * 1000.0;
     assert!(rms < 0.15, "speed RMS {rms:.3} m/s, {per_km:.2} switches per km");
     assert!(per_km < 2.0, "{per_km:.2} switches per km, RMS {rms:.3}");

@@ -39,7 +39,7 @@ fn scene(road: &Road, s_m: f64, room_m: f64) -> Scene {
             let lane = i % 2;
             let front_s_m = s_m - 250.0 + 25.0 * f64::from(i / 2) + 12.0 * f64::from(lane);
             let off = front_s_m - s_m;
-            let kept = if lane == 0 { off > 60.0 || off < -30.0 } else { off.abs() > room_m };
+            let kept = if lane == 0 { !(-30.0..=60.0).contains(&off) } else { off.abs() > room_m };
             kept.then_some(Neighbour {
                 id: u64::from(i),
                 class: VehicleClass::Car,

@@ -3,6 +3,7 @@
 use crate::PlannerError;
 use crate::decider::DeciderKind;
 use crate::error::config_in;
+use crate::estimator::EstimatorConfig;
 use crate::following::FollowingConfig;
 use crate::guard::GuardConfig;
 use crate::lane_change::LaneChangeConfig;
@@ -99,6 +100,8 @@ pub struct StackConfig {
     pub lateral: LateralConfig,
     /// Pedal, retarder and brakes.
     pub longitudinal: LongitudinalConfig,
+    /// Mass and rolling resistance from driving.
+    pub estimator: EstimatorConfig,
     /// The last check before the vehicle.
     pub guard: GuardConfig,
 }
@@ -118,6 +121,7 @@ impl Default for StackConfig {
             lane_change: LaneChangeConfig::default(),
             lateral: LateralConfig::default(),
             longitudinal: LongitudinalConfig::default(),
+            estimator: EstimatorConfig::default(),
             guard: GuardConfig::default(),
         }
     }
@@ -148,6 +152,7 @@ impl StackConfig {
         self.lane_change.check()?;
         self.lateral.check()?;
         self.longitudinal.check()?;
+        self.estimator.check()?;
         self.guard.check()?;
         self.decider.check()
     }

@@ -247,7 +247,9 @@ pub fn limit(
     let mut reasons = Vec::new();
     let planned = match &input.planned {
         None => {
-            reasons.push(GuardReason::NoPlan);
+            if !input.minimal_risk {
+                reasons.push(GuardReason::NoPlan);
+            }
             None
         }
         Some(c) if c.check_finite().is_err() => {

@@ -1,4 +1,5 @@
 //! The stack drives the tests' own truck.
+#![allow(clippy::unwrap_used)]
 
 mod support;
 

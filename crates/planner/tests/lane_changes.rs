@@ -1,4 +1,5 @@
 //! Lane changes in closed loop with the tests' own truck.
+#![allow(clippy::unwrap_used)]
 
 mod support;
 
@@ -55,10 +56,6 @@ fn one_change(road: &Road, misfit: Misfit) -> Errors {
             out.trailer_m = out.trailer_m.max((at.d_m - behind).abs());
         }
     }
-    println!(
-        "{misfit:?}: tractor {:.3} trailer {:.3} a_y {:.2} T {:.1}",
-        out.tractor_m, out.trailer_m, out.lateral_accel_m_s2, out.duration_s
-    );
     let centre = road.lanes()[usize::from(left)].center_d_m(plant.ego.s_m);
     assert!((plant.ego.d_m - centre).abs() < 0.02, "ended {} off", plant.ego.d_m - centre);
     out

@@ -1,9 +1,11 @@
 //! Who wishes lane changes. A decider only wishes; the safety gate decides whether it is driven.
 
 mod mobil;
+mod policy;
 mod rules;
 
 pub use mobil::{MobilConfig, mobil};
+pub use policy::Policy;
 pub use rules::rules;
 
 use crate::PlannerError;

@@ -6,6 +6,7 @@
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 
 pub mod data_sheet;
+pub mod traffic;
 
 use core::convert::Infallible;
 use road::Road;

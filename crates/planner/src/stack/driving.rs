@@ -1,22 +1,21 @@
-//! The planning stack: decide, plan speed, plan path, control, guard.
+//! The part of a tick with trustworthy inputs: reference, decision, path, both controllers.
 
 use alloc::vec::Vec;
 
+use super::{Stack, grade, wrapped};
 use crate::decider::{DeciderKind, LaneChoice, View, lane_ends, leave_ending_lane, mobil, rules};
 use crate::following::{Following, follow};
-use crate::guard::{GuardInput, GuardMemory, Headway, inspect, limit};
-use crate::lateral::{LateralController, PREVIEW_POINTS, PREVIEW_STEP_S, PathError};
+use crate::lateral::{PREVIEW_POINTS, PREVIEW_STEP_S, PathError};
 use crate::lateral_model::LOWEST_SPEED_M_S;
 use crate::leads::{LeadView, leads};
-use crate::limits_check::check_limits;
-use crate::longitudinal::{LongitudinalController, SpeedTarget};
+use crate::longitudinal::SpeedTarget;
 use crate::maneuver::{ManeuverPlanner, Situation};
+use crate::observation;
 use crate::path::{Lateral, LateralPath};
-use crate::reference_speed::{ReferenceSpeed, SpeedBounds};
-use crate::{PlannerError, StackConfig};
+use crate::reference_speed::SpeedBounds;
 use road::{LaneKind, Road};
 use tractrix_core::{
-    Command, EgoState, GearRequest, Maneuver, Plan, PlanStatus, Scene, Stamped, Time, VehicleLimits,
+    Command, EgoState, GearRequest, Maneuver, PlanStatus, Scene, Time, VehicleLimits,
 };
 
 /// Spacing of the published path, s, and its number of points.
@@ -25,156 +24,9 @@ const PATH_POINTS: usize = 26;
 /// Time for joining a lane's centre from beside it, s.
 const JOIN_S: f64 = 6.0;
 
-/// The planning stack of one truck.
-#[derive(Debug, Clone)]
-pub struct Stack {
-    config: StackConfig,
-    lateral: LateralController,
-    longitudinal: LongitudinalController,
-    reference: ReferenceSpeed,
-    guard: GuardMemory,
-    maneuver: Option<ManeuverPlanner>,
-    ticks: u64,
-    last_tick: Option<Time>,
-    /// Last trustworthy state, moved on by dead reckoning while there is no other.
-    believed: EgoState,
-    wish: LaneChoice,
-    plan: Plan,
-}
-
 impl Stack {
-    /// A stack for a truck.
-    ///
-    /// # Errors
-    /// [`PlannerError`] names the configuration key or the vehicle's value that cannot be used.
-    pub fn new(config: StackConfig, limits: &VehicleLimits) -> Result<Self, PlannerError> {
-        config.check()?;
-        check_limits(limits)?;
-        let lateral = LateralController::new(config.lateral, limits, config.rates.control_s())?;
-        Ok(Self {
-            lateral,
-            longitudinal: LongitudinalController::new(config.longitudinal),
-            reference: ReferenceSpeed::default(),
-            guard: GuardMemory::default(),
-            maneuver: None,
-            ticks: 0,
-            last_tick: None,
-            believed: EgoState::default(),
-            wish: LaneChoice::Keep,
-            plan: Plan::default(),
-            config,
-        })
-    }
-
-    /// The configuration.
-    #[must_use]
-    pub fn config(&self) -> &StackConfig {
-        &self.config
-    }
-
-    /// The latest plan.
-    #[must_use]
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-
-    /// Sets the driver's set speed, m/s, clamped to 0..40; a non-finite value is ignored.
-    pub fn set_speed(&mut self, speed_m_s: f64) {
-        if speed_m_s.is_finite() {
-            self.config.set_speed_m_s = speed_m_s.clamp(0.0, 40.0);
-        }
-    }
-
-    /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick.
-    pub fn request_lane_change(&mut self, wish: LaneChoice) {
-        self.wish = wish;
-    }
-
-    /// One tick: the plan for `[now, next tick)`, its command guarded. Never fails: what is wrong
-    /// with the inputs is in the plan's guard reasons.
-    pub fn tick(
-        &mut self,
-        now: Time,
-        ego: &Stamped<EgoState>,
-        scene: &Scene,
-        road: &Road,
-        limits: &VehicleLimits,
-    ) -> &Plan {
-        self.run(now, Some(ego), Some(scene), road, limits)
-    }
-
-    /// One tick without a scene, or without ego state and scene, because a seam failed: the
-    /// minimal-risk manoeuvre.
-    pub fn minimal_risk(
-        &mut self,
-        now: Time,
-        ego: Option<&Stamped<EgoState>>,
-        road: &Road,
-        limits: &VehicleLimits,
-    ) -> &Plan {
-        self.run(now, ego, None, road, limits)
-    }
-
-    fn run(
-        &mut self,
-        now: Time,
-        ego: Option<&Stamped<EgoState>>,
-        scene: Option<&Scene>,
-        road: &Road,
-        limits: &VehicleLimits,
-    ) -> &Plan {
-        let dt_s = self
-            .last_tick
-            .map_or(self.config.rates.tick_s, |t| now.seconds_since(t))
-            .clamp(0.0, 0.5);
-        self.last_tick = Some(now);
-        let (inspection, memory) =
-            inspect(&self.config.guard, &self.guard, now, ego, scene.map(|s| s.time));
-        self.guard = memory;
-        match ego {
-            Some(ego) if inspection.ego_usable => self.believed = ego.value,
-            _ => self.dead_reckon(dt_s, road),
-        }
-        let ego = self.believed;
-        let empty = Scene::default();
-        let scene = scene.unwrap_or(&empty);
-
-        self.plan.guard.clear();
-        self.plan.guard.extend_from_slice(&inspection.reasons);
-        self.plan.refusal = None;
-        let planned =
-            if inspection.ego_usable { self.drive(now, &ego, scene, road, limits) } else { None };
-        let curvature = road.line().at(ego.s_m).curvature_1_m;
-        let steady =
-            self.lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);
-        let input = GuardInput {
-            dt_s,
-            speed_m_s: ego.speed_m_s,
-            planned,
-            keep_lane_wheel_rad: steady * limits.lateral.steering_ratio,
-            minimal_risk: inspection.minimal_risk,
-            headway: self.headway(&ego, scene, road, limits),
-        };
-        let (guarded, memory) = limit(&self.config.guard, &self.guard, &input, limits);
-        self.guard = memory;
-        for reason in guarded.reasons {
-            if !self.plan.guard.contains(&reason) {
-                self.plan.guard.push(reason);
-            }
-        }
-        self.plan.command = guarded.command;
-        if guarded.minimal_risk {
-            self.maneuver = None;
-            self.plan.maneuver = Maneuver::MinimalRisk;
-            self.lateral
-                .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);
-        }
-        self.ticks = self.ticks.wrapping_add(1);
-        &self.plan
-    }
-
     /// Decide, plan and control with trustworthy inputs; `None` if there is no lane to drive in.
-    fn drive(
+    pub(super) fn drive(
         &mut self,
         now: Time,
         ego: &EgoState,
@@ -249,6 +101,10 @@ impl Stack {
     /// Checks the change under way and looks at what is wished.
     fn decide(&mut self, maneuver: &mut ManeuverPlanner, at: &Situation<'_>, due: bool) {
         self.plan.refusal = maneuver.update(at);
+        if self.policy.is_some() {
+            let reference = |s_m: f64| self.reference.at(s_m).map_or(0.0, |r| r.0);
+            self.observer.push(observation::frame(at.ego, at.scene, at.road, reference));
+        }
         let wish = match self.config.decider {
             DeciderKind::External => core::mem::take(&mut self.wish),
             _ if !due || maneuver.maneuver() != Maneuver::KeepLane => LaneChoice::Keep,
@@ -265,14 +121,24 @@ impl Stack {
                     _ if lane_ends(&view) => leave_ending_lane(&view),
                     DeciderKind::Rules { distance_m } => rules(&view, distance_m),
                     DeciderKind::Mobil(config) => mobil(&view, &config),
-                    DeciderKind::KeepLane | DeciderKind::Dqn | DeciderKind::External => {
-                        LaneChoice::Keep
-                    }
+                    DeciderKind::Dqn => self.learned(&view),
+                    DeciderKind::KeepLane | DeciderKind::External => LaneChoice::Keep,
                 }
             }
         };
         if let Err(refusal) = maneuver.request(wish, at) {
             self.plan.refusal = Some(refusal);
+        }
+    }
+
+    /// The learned policy's choice among the lanes that exist; keep while nobody is in sight.
+    fn learned(&self, view: &View<'_>) -> LaneChoice {
+        let seen = self.observer.latest().is_some_and(observation::sees_anyone);
+        match &self.policy {
+            Some(policy) if seen => {
+                policy.choose(&self.observer.observation(), |choice| view.beside(choice).is_some())
+            }
+            _ => LaneChoice::Keep,
         }
     }
 
@@ -339,33 +205,6 @@ impl Stack {
             })
             .min_by(|a, b| a.1.accel_m_s2.total_cmp(&b.1.accel_m_s2))
     }
-
-    /// The vehicle in the path with the least time to spare, for the guard.
-    fn headway(
-        &self,
-        ego: &EgoState,
-        scene: &Scene,
-        road: &Road,
-        limits: &VehicleLimits,
-    ) -> Option<Headway> {
-        let view = LeadView { ego, scene, road, limits, rss: &self.config.rss };
-        leads(&view, self.maneuver.as_ref()?)
-            .into_iter()
-            .flatten()
-            .filter(|lead| lead.in_path)
-            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
-            .map(|l| Headway { gap_m: l.gap_m, speed_m_s: l.speed_m_s, accel_m_s2: l.accel_m_s2 })
-    }
-
-    /// Moves the believed state along the road with the deceleration that was commanded.
-    fn dead_reckon(&mut self, dt_s: f64, road: &Road) {
-        let e = &mut self.believed;
-        let before = road.line().at(e.s_m).heading_rad;
-        let decel = self.guard.sent().xbr_decel_m_s2;
-        e.speed_m_s = (e.speed_m_s - decel * dt_s).max(0.0);
-        e.s_m += e.speed_m_s * dt_s;
-        e.yaw_rad += road.line().at(e.s_m).heading_rad - before;
-    }
 }
 
 /// The lane to start in: the one that the truck is in, or the nearest drivable one.
@@ -388,15 +227,6 @@ fn join_from(road: &Road, lane: u16, ego: &EgoState) -> LateralPath {
     LateralPath::join(road, lane, here, ego.s_m, length_m)
 }
 
-/// Mean grade under the combination, rad.
-fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
-    let g = &limits.geometry;
-    let length = g.length_m().max(1.0);
-    let front = road.at(ego.s_m + g.front_m, 0.0).z_m;
-    let rear = road.at(ego.s_m - g.rear_m(), 0.0).z_m;
-    libm::atan((front - rear) / length)
-}
-
 /// The steepest descent within the stopping distance ahead, rad, not above zero.
 fn steepest_descent(road: &Road, s_m: f64) -> f64 {
     (0..8).map(|i| libm::atan(road.line().at(s_m + 25.0 * f64::from(i)).slope)).fold(0.0, f64::min)
@@ -414,9 +244,4 @@ fn publish_path(
         (0..PATH_POINTS)
             .map(|i| path.point(road, ego.s_m + i as f64 * step_m, i as f64 * PATH_STEP_S)),
     );
-}
-
-/// Angle in -pi..pi.
-fn wrapped(angle_rad: f64) -> f64 {
-    libm::remainder(angle_rad, 2.0 * core::f64::consts::PI)
 }

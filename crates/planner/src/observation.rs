@@ -1,0 +1,222 @@
+//! What a learned decider sees: the paper's 216 numbers. One module for training and for the truck;
+//! weights carry the hash of [`SPEC`] and are refused if it differs.
+//!
+//! A frame has 9 rows of 6 columns. Row 0 is the ego, rows 1-2 the two nearest vehicles behind (to
+//! 50 m), rows 3-8 the six nearest ahead (to 100 m), nearest first; absent rows are zero but for the
+//! last column. Columns, each clipped to -1..1:
+//!
+//! | column | ego | neighbour | divided by |
+//! |---|---|---|---|
+//! | 0 presence | 1 | 1 | 1 |
+//! | 1 along the road | 1 | its centre minus the ego's reference point, m | 100 |
+//! | 2 to the right | lateral distance from the leftmost through lane's centre, m | lateral distance from the ego, m | 8 |
+//! | 3 speed | own, m/s | ego minus neighbour, m/s | 40 |
+//! | 4 lateral speed to the right | own, m/s | neighbour minus ego, m/s | 40 |
+//! | 5 reference speed | in row `i` the one at `s + v i 3/8 s` for all rows, m/s | | 40 |
+//!
+//! Four frames of the present and of 1, 2 and 3 s ago, newest first; frames before the start are
+//! zero. The released code fills column 5 with one value; here it is the profile of the next three
+//! seconds that the paper describes.
+
+use alloc::collections::VecDeque;
+use road::{LaneKind, Road};
+use tractrix_core::{EgoState, Neighbour, Scene};
+
+/// Rows of a frame.
+pub const ROWS: usize = 9;
+/// Columns of a frame.
+pub const COLUMNS: usize = 6;
+/// Numbers in a frame.
+pub const FRAME: usize = ROWS * COLUMNS;
+/// Frames in an observation.
+pub const FRAMES: usize = 4;
+/// Numbers in an observation.
+pub const SIZE: usize = FRAME * FRAMES;
+
+/// The layout in one line; changing the layout means changing this line.
+pub const SPEC: &str = "tractrix-observation-1: 4 frames (0,1,2,3 s ago) x 9 rows (ego, 2 behind <= 50 m, \
+6 ahead <= 100 m, nearest first) x 6 columns (presence, dx/100 m, right/8 m, v/40 m/s, \
+v_right/40 m/s, v_ref(s + v i 3/8 s)/40 m/s), clipped to -1..1";
+
+const AHEAD_M: f64 = 100.0;
+const BEHIND_M: f64 = 50.0;
+const AHEAD_ROWS: usize = 6;
+const BEHIND_ROWS: usize = 2;
+const PROFILE_S: f64 = 3.0;
+
+/// Hash of the layout: FNV-1a, 64 bit, of [`SPEC`]. It guards against mistakes, not against attack.
+#[must_use]
+pub const fn spec_hash() -> u64 {
+    let bytes = SPEC.as_bytes();
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut i = 0;
+    while i < bytes.len() {
+        hash = (hash ^ bytes[i] as u64).wrapping_mul(0x0100_0000_01b3);
+        i += 1;
+    }
+    hash
+}
+
+/// One frame.
+pub type Frame = [f32; FRAME];
+
+/// The frame of this instant. `reference_speed_m_s` gives the reference speed at a station.
+#[must_use]
+pub fn frame(
+    ego: &EgoState,
+    scene: &Scene,
+    road: &Road,
+    reference_speed_m_s: impl Fn(f64) -> f64,
+) -> Frame {
+    let mut out = [0.0; FRAME];
+    let leftmost = road
+        .lanes_at(ego.s_m)
+        .filter(|l| l.kind == LaneKind::Driving)
+        .map(|l| l.center_d_m(ego.s_m))
+        .fold(f64::NEG_INFINITY, f64::max);
+    let from_left = if leftmost.is_finite() { leftmost - ego.d_m } else { 0.0 };
+    let ego_row = [1.0, 100.0, from_left, ego.speed_m_s, -ego.lateral_speed_m_s];
+    write_row(&mut out, 0, ego_row);
+    let dx = |n: &Neighbour| 0.5 * (n.front_s_m + n.rear_s_m) - ego.s_m;
+    let mut put = |first_row: usize, rows: usize, wanted: &dyn Fn(f64) -> bool| {
+        let mut farther_than = (-1.0, 0);
+        for row in 0..rows {
+            // The next nearest after the one in the row before; ties go by identifier
+            let key = |n: &Neighbour| (libm::hypot(dx(n), n.d_m - ego.d_m), n.id);
+            let next =
+                scene.neighbours.iter().filter(|n| wanted(dx(n)) && key(n) > farther_than).min_by(
+                    |a, b| key(a).partial_cmp(&key(b)).unwrap_or(core::cmp::Ordering::Equal),
+                );
+            let Some(n) = next else { break };
+            farther_than = key(n);
+            let right = ego.d_m - n.d_m;
+            let closing = ego.speed_m_s - n.speed_m_s;
+            let drift = ego.lateral_speed_m_s - n.lateral_speed_m_s;
+            write_row(&mut out, first_row + row, [1.0, dx(n), right, closing, drift]);
+        }
+    };
+    put(1, BEHIND_ROWS, &|dx| (-BEHIND_M..0.0).contains(&dx));
+    put(1 + BEHIND_ROWS, AHEAD_ROWS, &|dx| (0.0..=AHEAD_M).contains(&dx));
+    for row in 0..ROWS {
+        let time_s = PROFILE_S * row as f64 / (ROWS - 1) as f64;
+        let speed = reference_speed_m_s(ego.s_m + ego.speed_m_s * time_s);
+        out[row * COLUMNS + 5] = scaled(speed, 40.0);
+    }
+    out
+}
+
+fn write_row(out: &mut Frame, row: usize, [presence, along, right, speed, drift]: [f64; 5]) {
+    let values = [
+        scaled(presence, 1.0),
+        scaled(along, 100.0),
+        scaled(right, 8.0),
+        scaled(speed, 40.0),
+        scaled(drift, 40.0),
+    ];
+    out[row * COLUMNS..row * COLUMNS + 5].copy_from_slice(&values);
+}
+
+fn scaled(value: f64, by: f64) -> f32 {
+    (value / by).clamp(-1.0, 1.0) as f32
+}
+
+/// Whether a frame shows any neighbour.
+#[must_use]
+pub fn sees_anyone(frame: &Frame) -> bool {
+    (1..ROWS).any(|row| frame[row * COLUMNS] > 0.0)
+}
+
+/// The frames of the last three seconds.
+#[derive(Debug, Clone)]
+pub struct Observer {
+    frames: VecDeque<Frame>,
+    per_second: usize,
+}
+
+impl Observer {
+    /// An observer that is given a frame every `period_s`, at most one second.
+    #[must_use]
+    pub fn new(period_s: f64) -> Self {
+        let per_second = libm::round(1.0 / period_s.clamp(1e-3, 1.0)) as usize;
+        Self { frames: VecDeque::with_capacity(3 * per_second + 1), per_second }
+    }
+
+    /// Takes the frame of this instant.
+    pub fn push(&mut self, frame: Frame) {
+        self.frames.push_front(frame);
+        self.frames.truncate((FRAMES - 1) * self.per_second + 1);
+    }
+
+    /// Forgets everything: the start of an episode.
+    pub fn clear(&mut self) {
+        self.frames.clear();
+    }
+
+    /// The latest frame.
+    #[must_use]
+    pub fn latest(&self) -> Option<&Frame> {
+        self.frames.front()
+    }
+
+    /// The observation, newest frame first.
+    #[must_use]
+    pub fn observation(&self) -> [f32; SIZE] {
+        let mut out = [0.0; SIZE];
+        for (i, part) in out.chunks_exact_mut(FRAME).enumerate() {
+            if let Some(frame) = self.frames.get(i * self.per_second) {
+                part.copy_from_slice(frame);
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::vec::Vec;
+
+    fn car(id: u64, centre_s_m: f64, d_m: f64, speed_m_s: f64) -> Neighbour {
+        Neighbour {
+            id,
+            front_s_m: centre_s_m + 2.0,
+            rear_s_m: centre_s_m - 2.0,
+            d_m,
+            width_m: 1.8,
+            speed_m_s,
+            ..Neighbour::default()
+        }
+    }
+
+    #[test]
+    fn rows_hold_the_nearest_vehicles_and_the_ranges_are_cut() {
+        let road = road::builtin::flat(2000.0);
+        let d = road.lanes()[0].center_d_m(0.0);
+        let ego = EgoState { s_m: 500.0, d_m: d, speed_m_s: 20.0, ..EgoState::default() };
+        let neighbours: Vec<_> =
+            [(1, 460.0), (2, 440.0), (3, 490.0), (4, 480.0), (5, 540.0), (6, 605.0)]
+                .map(|(id, s)| car(id, s, d + 3.75, 25.0))
+                .into();
+        let scene = Scene { neighbours, ..Scene::default() };
+        let f = frame(&ego, &scene, &road, |_| 20.0);
+        let row = |r: usize| &f[r * COLUMNS..(r + 1) * COLUMNS];
+        assert_eq!(row(1)[1], -0.1);
+        assert_eq!(row(2)[1], -0.2);
+        assert_eq!(row(3)[1], 0.4);
+        assert_eq!(row(4)[0], 0.0, "605 m is 105 m ahead");
+        assert!((row(3)[2] + 3.75 / 8.0).abs() < 1e-6, "a car on the left is at negative right");
+        assert!((row(3)[3] + 5.0 / 40.0).abs() < 1e-6);
+        assert_eq!(row(8)[5], 0.5);
+    }
+
+    #[test]
+    fn the_stack_of_frames_goes_back_in_whole_seconds() {
+        let mut o = Observer::new(0.1);
+        for i in 0..40 {
+            o.push([i as f32 / 40.0; FRAME]);
+        }
+        let x = o.observation();
+        let at = |frame: usize| (x[frame * FRAME] * 40.0).round() as i32;
+        assert_eq!([at(0), at(1), at(2), at(3)], [39, 29, 19, 9]);
+    }
+}

@@ -1,0 +1,275 @@
+//! The planning stack: decide, plan speed, plan path, control, guard.
+
+mod driving;
+
+use alloc::sync::Arc;
+
+use crate::decider::{DeciderKind, LaneChoice, Policy};
+use crate::estimator::{LoadEstimate, LoadEstimator};
+use crate::guard::{GuardInput, GuardMemory, Headway, inspect, limit};
+use crate::lateral::LateralController;
+use crate::leads::{LeadView, leads};
+use crate::limits_check::check_limits;
+use crate::longitudinal::LongitudinalController;
+use crate::maneuver::ManeuverPlanner;
+use crate::observation::Observer;
+use crate::reference_speed::ReferenceSpeed;
+use crate::{PlannerError, StackConfig};
+use road::Road;
+use tractrix_core::{EgoState, Maneuver, Plan, Scene, Stamped, Time, VehicleLimits};
+
+/// The planning stack of one truck.
+#[derive(Debug, Clone)]
+pub struct Stack {
+    config: StackConfig,
+    lateral: LateralController,
+    longitudinal: LongitudinalController,
+    reference: ReferenceSpeed,
+    guard: GuardMemory,
+    maneuver: Option<ManeuverPlanner>,
+    ticks: u64,
+    last_tick: Option<Time>,
+    /// Last trustworthy state, moved on by dead reckoning while there is no other.
+    believed: EgoState,
+    wish: LaneChoice,
+    policy: Option<Arc<Policy>>,
+    observer: Observer,
+    estimator: LoadEstimator,
+    /// The truck's limits with the estimated load, once there is a valid estimate.
+    estimated: Option<VehicleLimits>,
+    plan: Plan,
+}
+
+impl Stack {
+    /// A stack for a truck.
+    ///
+    /// # Errors
+    /// [`PlannerError`] names the configuration key or the vehicle's value that cannot be used;
+    /// [`PlannerError::NoPolicy`] if the decider is the learned one.
+    pub fn new(config: StackConfig, limits: &VehicleLimits) -> Result<Self, PlannerError> {
+        if config.decider == DeciderKind::Dqn {
+            return Err(PlannerError::NoPolicy);
+        }
+        Self::build(config, limits, None)
+    }
+
+    /// A stack whose decider is a learned policy.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn with_policy(
+        config: StackConfig,
+        limits: &VehicleLimits,
+        policy: Arc<Policy>,
+    ) -> Result<Self, PlannerError> {
+        Self::build(StackConfig { decider: DeciderKind::Dqn, ..config }, limits, Some(policy))
+    }
+
+    fn build(
+        config: StackConfig,
+        limits: &VehicleLimits,
+        policy: Option<Arc<Policy>>,
+    ) -> Result<Self, PlannerError> {
+        config.check()?;
+        check_limits(limits)?;
+        let rates = &config.rates;
+        Ok(Self {
+            lateral: LateralController::new(config.lateral, limits, rates.control_s())?,
+            longitudinal: LongitudinalController::new(config.longitudinal),
+            reference: ReferenceSpeed::default(),
+            guard: GuardMemory::default(),
+            maneuver: None,
+            ticks: 0,
+            last_tick: None,
+            believed: EgoState::default(),
+            wish: LaneChoice::Keep,
+            policy,
+            observer: Observer::new(rates.tick_s * f64::from(rates.path_ticks)),
+            estimator: LoadEstimator::new(config.estimator, &limits.road_load),
+            estimated: None,
+            plan: Plan::default(),
+            config,
+        })
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &StackConfig {
+        &self.config
+    }
+
+    /// The latest plan.
+    #[must_use]
+    pub fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The present estimate of mass and rolling resistance.
+    #[must_use]
+    pub fn load_estimate(&self) -> LoadEstimate {
+        self.estimator.estimate()
+    }
+
+    /// Sets the driver's set speed, m/s, clamped to 0..40; a non-finite value is ignored.
+    pub fn set_speed(&mut self, speed_m_s: f64) {
+        if speed_m_s.is_finite() {
+            self.config.set_speed_m_s = speed_m_s.clamp(0.0, 40.0);
+        }
+    }
+
+    /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick.
+    pub fn request_lane_change(&mut self, wish: LaneChoice) {
+        self.wish = wish;
+    }
+
+    /// One tick: the plan for `[now, next tick)`, its command guarded. Never fails: what is wrong
+    /// with the inputs is in the plan's guard reasons.
+    pub fn tick(
+        &mut self,
+        now: Time,
+        ego: &Stamped<EgoState>,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> &Plan {
+        self.run(now, Some(ego), Some(scene), road, limits)
+    }
+
+    /// One tick without a scene, or without ego state and scene, because a seam failed: the
+    /// minimal-risk manoeuvre.
+    pub fn minimal_risk(
+        &mut self,
+        now: Time,
+        ego: Option<&Stamped<EgoState>>,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> &Plan {
+        self.run(now, ego, None, road, limits)
+    }
+
+    fn run(
+        &mut self,
+        now: Time,
+        ego: Option<&Stamped<EgoState>>,
+        scene: Option<&Scene>,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> &Plan {
+        let dt_s = self
+            .last_tick
+            .map_or(self.config.rates.tick_s, |t| now.seconds_since(t))
+            .clamp(0.0, 0.5);
+        self.last_tick = Some(now);
+        let (inspection, memory) =
+            inspect(&self.config.guard, &self.guard, now, ego, scene.map(|s| s.time));
+        self.guard = memory;
+        match ego {
+            Some(ego) if inspection.ego_usable => self.believed = ego.value,
+            _ => self.dead_reckon(dt_s, road),
+        }
+        let ego = self.believed;
+        let empty = Scene::default();
+        let scene = scene.unwrap_or(&empty);
+
+        self.plan.guard.clear();
+        self.plan.guard.extend_from_slice(&inspection.reasons);
+        self.plan.refusal = None;
+        let planned = if inspection.ego_usable {
+            self.estimate_load(dt_s, &ego, road, limits);
+            let estimated = self.estimated.take();
+            let known = estimated.as_ref().unwrap_or(limits);
+            let planned = self.drive(now, &ego, scene, road, known);
+            self.estimated = estimated;
+            planned
+        } else {
+            self.maneuver = None;
+            None
+        };
+        let curvature = road.line().at(ego.s_m).curvature_1_m;
+        let steady =
+            self.lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);
+        let input = GuardInput {
+            dt_s,
+            speed_m_s: ego.speed_m_s,
+            planned,
+            keep_lane_wheel_rad: steady * limits.lateral.steering_ratio,
+            minimal_risk: inspection.minimal_risk,
+            headway: self.headway(&ego, scene, road, limits),
+        };
+        let (guarded, memory) = limit(&self.config.guard, &self.guard, &input, limits);
+        self.guard = memory;
+        for reason in guarded.reasons {
+            if !self.plan.guard.contains(&reason) {
+                self.plan.guard.push(reason);
+            }
+        }
+        self.plan.command = guarded.command;
+        if guarded.minimal_risk {
+            self.plan.maneuver = Maneuver::MinimalRisk;
+            self.lateral
+                .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);
+        }
+        self.ticks = self.ticks.wrapping_add(1);
+        &self.plan
+    }
+
+    /// Listens to the force balance; once a second takes over a valid estimate that differs.
+    fn estimate_load(&mut self, dt_s: f64, ego: &EgoState, road: &Road, limits: &VehicleLimits) {
+        if !self.config.estimator.enabled {
+            return;
+        }
+        self.estimator.update(dt_s, ego, grade(road, ego, limits), limits);
+        if !self.ticks.is_multiple_of(u64::from(self.config.rates.decision_ticks)) {
+            return;
+        }
+        let estimate = self.estimator.estimate();
+        let planned_kg =
+            self.estimated.as_ref().map_or(limits.road_load.mass_kg, |l| l.road_load.mass_kg);
+        if estimate.valid && (estimate.mass_kg / planned_kg - 1.0).abs() > 0.01 {
+            let known = self.estimated.get_or_insert_with(|| limits.clone());
+            known.road_load.mass_kg = estimate.mass_kg;
+            known.road_load.rolling_coeff = estimate.rolling_coeff;
+        }
+    }
+
+    /// The vehicle in the path with the least time to spare, for the guard.
+    fn headway(
+        &self,
+        ego: &EgoState,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+    ) -> Option<Headway> {
+        let view = LeadView { ego, scene, road, limits, rss: &self.config.rss };
+        leads(&view, self.maneuver.as_ref()?)
+            .into_iter()
+            .flatten()
+            .filter(|lead| lead.in_path)
+            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+            .map(|l| Headway { gap_m: l.gap_m, speed_m_s: l.speed_m_s, accel_m_s2: l.accel_m_s2 })
+    }
+
+    /// Moves the believed state along the road with the deceleration that was commanded.
+    fn dead_reckon(&mut self, dt_s: f64, road: &Road) {
+        let e = &mut self.believed;
+        let before = road.line().at(e.s_m).heading_rad;
+        let decel = self.guard.sent().xbr_decel_m_s2;
+        e.speed_m_s = (e.speed_m_s - decel * dt_s).max(0.0);
+        e.s_m += e.speed_m_s * dt_s;
+        e.yaw_rad += road.line().at(e.s_m).heading_rad - before;
+    }
+}
+
+/// Mean grade under the combination, rad.
+fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
+    let g = &limits.geometry;
+    let length = g.length_m().max(1.0);
+    let front = road.at(ego.s_m + g.front_m, 0.0).z_m;
+    let rear = road.at(ego.s_m - g.rear_m(), 0.0).z_m;
+    libm::atan((front - rear) / length)
+}
+
+/// Angle in -pi..pi.
+fn wrapped(angle_rad: f64) -> f64 {
+    libm::remainder(angle_rad, 2.0 * core::f64::consts::PI)
+}
