@@ -1,5 +1,7 @@
 //! Bad input gives a clear error or a finding, never a panic.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
 use std::path::Path;
 
 use diagnosis::{Action, Channel, DiagnosisError, DriveSet, FindingKind, read_drives};
