@@ -12,6 +12,8 @@ use crate::{Cubics, Jet, Line, Placed, Shape};
 pub const BAKE_TOLERANCE_M: f64 = 1e-9;
 const LONGEST_CELL_M: f64 = 25.0;
 const SHORTEST_CELL_M: f64 = 0.02;
+/// A curve that needs more cells than this is not followed more closely.
+const MOST_CELLS: f64 = 4_000.0;
 
 /// One piece of a baked line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,8 +107,9 @@ impl Baker {
         }
         let parts = libm::ceil(length_m / LONGEST_CELL_M).max(1.0) as usize;
         let h = length_m / parts as f64;
+        let least_m = SHORTEST_CELL_M.max(length_m / MOST_CELLS);
         for i in 0..parts {
-            self.refine(i as f64 * h, (i + 1) as f64 * h, curve);
+            self.refine(i as f64 * h, (i + 1) as f64 * h, least_m, curve);
         }
         self.s_m += length_m;
     }
@@ -126,7 +129,7 @@ impl Baker {
         })
     }
 
-    fn refine(&mut self, from_m: f64, to_m: f64, curve: &dyn Fn(f64) -> Jet) {
+    fn refine(&mut self, from_m: f64, to_m: f64, least_m: f64, curve: &dyn Fn(f64) -> Jet) {
         let h = to_m - from_m;
         let before = self.end_heading_rad();
         let cell = Cell::fit(self.s_m + from_m, h, &curve(from_m), &curve(to_m), before);
@@ -138,10 +141,10 @@ impl Baker {
             let scale = libm::fabs(x).max(libm::fabs(y));
             libm::hypot(x - exact[0], y - exact[1]) > BAKE_TOLERANCE_M + 1e-15 * scale
         });
-        if far && h > SHORTEST_CELL_M {
+        if far && h > least_m {
             let mid = 0.5 * (from_m + to_m);
-            self.refine(from_m, mid, curve);
-            self.refine(mid, to_m, curve);
+            self.refine(from_m, mid, least_m, curve);
+            self.refine(mid, to_m, least_m, curve);
         } else {
             self.cells.push(cell);
         }

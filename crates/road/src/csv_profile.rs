@@ -13,9 +13,11 @@ const MAX_ROWS: usize = 2_000_000;
 const MAX_BYTES: u64 = 256 << 20;
 const LANE_WIDTH_M: f64 = 3.75;
 /// Half width of the window that smooths heights, m.
-const HEIGHT_WINDOW_M: f64 = 40.0;
+const HEIGHT_WINDOW_M: f64 = 25.0;
 /// Half width of the window that smooths x and y, m.
 const PLAN_WINDOW_M: f64 = 60.0;
+/// Points nearer to each other than this have no direction, m.
+const LEAST_CHORD_M: f64 = 4.0;
 /// Limit where the file has none: 90 km/h.
 const DEFAULT_LIMIT_M_S: f64 = 25.0;
 
@@ -127,7 +129,9 @@ fn tight(curvature_1_m: f64, s_m: f64) -> String {
     format!("curvature {curvature_1_m} 1/m at s_m = {s_m} is tighter than R = 20 m")
 }
 
-/// The plan view through smoothed points, with continuous heading and curvature.
+/// The plan view through smoothed points, with continuous heading and curvature. Where x and y do
+/// not move as `s_m` does (by more than 10 %: gaps, doubled points), stations and heights are kept
+/// and the plan view follows the headings instead.
 fn plan_through(
     path: &str,
     s: &[f64],
@@ -135,7 +139,6 @@ fn plan_through(
     y: &[f64],
     elevation: Cubics,
 ) -> Result<Line, RoadError> {
-    let invalid = |why: String| RoadError::Invalid { name: path.into(), why };
     let (fx, fy) = (local_quadratic(s, x, PLAN_WINDOW_M), local_quadratic(s, y, PLAN_WINDOW_M));
     let jet = |(u, v): (&LocalFit, &LocalFit)| Jet {
         point: [u.value, v.value],
@@ -143,21 +146,60 @@ fn plan_through(
         second: [u.bend, v.bend],
     };
     let jets: Vec<Jet> = fx.iter().zip(&fy).map(jet).collect();
+    let speed = |j: &Jet| libm::hypot(j.first[0], j.first[1]);
+    if !jets.iter().all(|j| speed(j) > 0.9 && speed(j) < 1.1) {
+        return plan_by_headings(path, s, x, y, elevation);
+    }
     let mut baker = Baker::default();
     for (i, jet) in jets.iter().enumerate() {
-        let speed = libm::hypot(jet.first[0], jet.first[1]);
-        if !(speed > 0.9 && speed < 1.1) {
-            let why = format!("x_m and y_m move {speed} m per metre of s_m at s_m = {}", s[i]);
-            return Err(invalid(why));
-        }
         if !(jet.curvature_1_m().abs() <= MAX_CURVATURE_1_M) {
-            return Err(invalid(tight(jet.curvature_1_m(), s[i])));
+            let why = tight(jet.curvature_1_m(), s[i]);
+            return Err(RoadError::Invalid { name: path.into(), why });
         }
         if let Some(next) = jets.get(i + 1) {
             baker.push_between(s[i + 1] - s[i], jet, next);
         }
     }
     Ok(baker.finish(elevation, Cubics::default()))
+}
+
+/// Headings of the chords between points that lie apart, smoothed over station; their slope is the
+/// curvature.
+fn plan_by_headings(
+    path: &str,
+    s: &[f64],
+    x: &[f64],
+    y: &[f64],
+    elevation: Cubics,
+) -> Result<Line, RoadError> {
+    let invalid = |why: String| RoadError::Invalid { name: path.into(), why };
+    let (mut at, mut headings): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+    let mut from = 0;
+    for i in 1..s.len() {
+        let (dx, dy) = (x[i] - x[from], y[i] - y[from]);
+        if libm::hypot(dx, dy) < LEAST_CHORD_M {
+            continue;
+        }
+        let heading = libm::atan2(dy, dx);
+        let before = headings.last().copied().unwrap_or(heading);
+        at.push(0.5 * (s[from] + s[i]));
+        headings.push(before + libm::remainder(heading - before, core::f64::consts::TAU));
+        from = i;
+    }
+    if at.len() < 3 {
+        return Err(invalid("x_m and y_m do not move along s_m".into()));
+    }
+    let smooth = local_quadratic(&at, &headings, PLAN_WINDOW_M);
+    let mut curvature: Vec<(f64, f64)> =
+        at.iter().zip(&smooth).map(|(&s, f)| (s, f.slope)).collect();
+    if let Some((s, k)) = curvature.iter().find(|p| !(p.1.abs() <= MAX_CURVATURE_1_M)) {
+        return Err(invalid(tight(*k, *s)));
+    }
+    let (first, last) = (curvature[0], curvature[curvature.len() - 1]);
+    curvature.insert(0, (0.0, first.1));
+    curvature.push((s[s.len() - 1], last.1));
+    let heading = smooth[0].value - first.1 * first.0;
+    Ok(Line::from_pose([x[0], y[0]], heading, &curvature, elevation, Cubics::default()))
 }
 
 #[cfg(test)]

@@ -147,11 +147,7 @@ impl Cubics {
 
     fn piece(&self, s_m: f64) -> (usize, f64) {
         let s = if s_m < self.end_m { s_m } else { self.end_m };
-        let i = if self.starts_m.len() == 1 {
-            0
-        } else {
-            self.starts_m.partition_point(|&v| v <= s).max(1) - 1
-        };
+        let i = locate(&self.starts_m, s);
         (i, (s - self.starts_m[i]).max(0.0))
     }
 
@@ -193,6 +189,27 @@ impl Cubics {
     }
 }
 
+/// Index of the last start at or before `s` (0 if none): a guess as if the starts were evenly
+/// spaced, a few steps from it, and bisection where they are not.
+fn locate(starts: &[f64], s: f64) -> usize {
+    let last = starts.len() - 1;
+    if last == 0 || !(s > starts[0]) {
+        return 0;
+    }
+    let share = (s - starts[0]) / (starts[last] - starts[0]);
+    let mut i = ((share * last as f64) as usize).min(last);
+    for _ in 0..4 {
+        if starts[i] > s {
+            i -= 1;
+        } else if i < last && starts[i + 1] <= s {
+            i += 1;
+        } else {
+            return i;
+        }
+    }
+    starts.partition_point(|&v| v <= s) - 1
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,6 +237,16 @@ mod tests {
             (5.0, [9.0, 0.0, 0.0, 0.0]),
         ]);
         assert_eq!((c.at(1.0), c.at(7.0), c.at(12.0)), (2.0, 2.0, 3.0));
+    }
+
+    #[test]
+    fn pieces_are_found_however_unevenly_they_lie() {
+        let starts = [0.0, 0.1, 0.2, 0.3, 5.0, 5.5, 100.0, 1_000.0, 1_000.5, 5_000.0];
+        for i in -10..60_000 {
+            let s = f64::from(i) * 0.1;
+            let expected = starts.iter().rposition(|v| *v <= s).unwrap_or(0);
+            assert_eq!(locate(&starts, s), expected, "{s}");
+        }
     }
 
     #[test]

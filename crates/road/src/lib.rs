@@ -18,6 +18,7 @@ mod line;
 pub mod opendrive;
 mod road;
 mod shape;
+mod small;
 #[cfg(feature = "std")]
 mod smooth;
 

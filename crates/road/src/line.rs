@@ -9,6 +9,7 @@ use alloc::vec::Vec;
 #[cfg(feature = "std")]
 use crate::Jet;
 use crate::bake::{Baker, Cell};
+use crate::small;
 use crate::{Cubics, Placed, Shape};
 
 /// A point farther than this from the line, or beyond its ends, has no road coordinates.
@@ -68,7 +69,19 @@ impl Line {
         elevation: Cubics,
         bank: Cubics,
     ) -> Self {
-        let (mut x_m, mut y_m, mut heading) = (0.0, 0.0, heading_rad);
+        Self::from_pose([0.0, 0.0], heading_rad, points, elevation, bank)
+    }
+
+    /// As [`Line::from_curvature`], from another point of the map.
+    #[must_use]
+    pub fn from_pose(
+        start_m: [f64; 2],
+        heading_rad: f64,
+        points: &[(f64, f64)],
+        elevation: Cubics,
+        bank: Cubics,
+    ) -> Self {
+        let ([mut x_m, mut y_m], mut heading) = (start_m, heading_rad);
         let mut baker = Baker::default();
         for w in points.windows(2) {
             let ((s_m, start_1_m), (s1, end_1_m)) = (w[0], w[1]);
@@ -158,20 +171,35 @@ impl Line {
     }
 
     fn knot(&self, cell: &Cell, s_m: f64) -> Knot {
+        self.knot_and_tangent(cell, s_m).0
+    }
+
+    /// The line at a station with its unit tangent (x, y), which saves turning the heading back.
+    pub(crate) fn at_with_tangent(&self, s_m: f64) -> (Knot, [f64; 2]) {
+        let s = s_m.clamp(0.0, self.length_m);
+        self.knot_and_tangent(&self.cells[self.cell(s)], s)
+    }
+
+    fn knot_and_tangent(&self, cell: &Cell, s_m: f64) -> (Knot, [f64; 2]) {
         let local = cell.local(s_m - cell.s_m);
         let ([u, v], [du, dv], [ddu, ddv]) = (local.point, local.first, local.second);
         let q = du * du + dv * dv;
+        let speed = libm::sqrt(q);
+        let turned = if du > 0.0 { small::atan(dv / du) } else { libm::atan2(dv, du) };
         let (z_m, slope) = self.elevation.at_with_slope(s_m);
-        Knot {
+        let knot = Knot {
             s_m,
             x_m: cell.x_m + cell.cos * u - cell.sin * v,
             y_m: cell.y_m + cell.sin * u + cell.cos * v,
-            heading_rad: cell.heading_rad + libm::atan2(dv, du),
-            curvature_1_m: (du * ddv - dv * ddu) / (q * libm::sqrt(q)),
+            heading_rad: cell.heading_rad + turned,
+            curvature_1_m: (du * ddv - dv * ddu) / (q * speed),
             z_m,
             slope,
             bank_rad: self.bank.at(s_m),
-        }
+        };
+        let tangent =
+            [(cell.cos * du - cell.sin * dv) / speed, (cell.sin * du + cell.cos * dv) / speed];
+        (knot, tangent)
     }
 
     /// Station of the nearest point of the line and the distance to its left in plan view. Near

@@ -2,6 +2,7 @@
 
 use alloc::{string::String, vec::Vec};
 
+use crate::small;
 use crate::{Cubics, LaneKind, LaneTrack, Line, RoadError};
 
 /// A point on the road surface.
@@ -163,16 +164,15 @@ impl Road {
     /// The surface at (s, d); s is clamped to the road.
     #[must_use]
     pub fn at(&self, s_m: f64, d_m: f64) -> RoadPoint {
-        let k = self.line.at(s_m);
-        let (sin, cos) = libm::sincos(k.heading_rad);
-        let (sin_bank, cos_bank) = libm::sincos(k.bank_rad);
+        let (k, [cos, sin]) = self.line.at_with_tangent(s_m);
+        let (sin_bank, cos_bank) = small::sincos(k.bank_rad);
         RoadPoint {
             x_m: k.x_m - d_m * cos_bank * sin,
             y_m: k.y_m + d_m * cos_bank * cos,
             z_m: k.z_m + d_m * sin_bank,
             heading_rad: k.heading_rad,
             curvature_1_m: k.curvature_1_m,
-            grade_rad: libm::atan(k.slope),
+            grade_rad: small::atan(k.slope),
             bank_rad: k.bank_rad,
         }
     }
@@ -181,7 +181,8 @@ impl Road {
     #[must_use]
     pub fn project(&self, x_m: f64, y_m: f64, hint_s_m: Option<f64>) -> Option<RoadPosition> {
         let (s_m, flat) = self.line.project(x_m, y_m, hint_s_m)?;
-        Some(RoadPosition { s_m, d_m: flat / libm::cos(self.line.at(s_m).bank_rad) })
+        let (_, cos_bank) = small::sincos(self.line.bank().at(s_m));
+        Some(RoadPosition { s_m, d_m: flat / cos_bank })
     }
 
     /// All lane tracks; the index is the id.
@@ -257,7 +258,7 @@ impl Road {
             *p = ProfilePoint {
                 s_m: k.s_m,
                 z_m: k.z_m,
-                grade_rad: libm::atan(k.slope),
+                grade_rad: small::atan(k.slope),
                 curvature_1_m: k.curvature_1_m,
                 bank_rad: k.bank_rad,
                 speed_limit_m_s: self.speed_limit_m_s(k.s_m),

@@ -103,6 +103,22 @@ impl Placed {
     }
 }
 
+/// A paramPoly3 must be between half and twice as long as stated.
+#[cfg(feature = "std")]
+const ODD_LENGTH: f64 = 2.0;
+
+#[cfg(feature = "std")]
+impl Placed {
+    /// The length of the curve if it has nothing to do with the stated one, m.
+    pub(crate) fn odd_length_m(&self) -> Option<f64> {
+        let Shape::ParamPoly3 { u, v, normalized } = self.shape else { return None };
+        let p_end = if normalized { 1.0 } else { self.length_m };
+        let length = integrate(|p| libm::hypot(slope(u, p), slope(v, p)), 0.0, p_end);
+        let share = length / self.length_m;
+        (!(share < ODD_LENGTH && share > 1.0 / ODD_LENGTH)).then_some(length)
+    }
+}
+
 impl Shape {
     /// Point and derivatives in the element's own axes.
     fn local(&self, ds: f64, length: f64) -> Jet {
@@ -231,4 +247,163 @@ fn invert_arc_length(speed: impl Fn(f64) -> f64, arc: f64, guess: f64) -> f64 {
         }
     }
     p
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::PI;
+
+    fn at(shape: Shape, length_m: f64, ds: f64) -> Jet {
+        Placed { s_m: 0.0, x_m: 0.0, y_m: 0.0, heading_rad: 0.0, length_m, shape }.at(ds)
+    }
+
+    fn near(a: f64, b: f64, tolerance: f64) {
+        assert!((a - b).abs() <= tolerance, "{a} is not {b}");
+    }
+
+    /// Fresnel integrals by their power series (Abramowitz and Stegun 7.3.11, 7.3.13).
+    fn fresnel(x: f64) -> (f64, f64) {
+        let q = 0.5 * PI * x * x;
+        let (mut c, mut s, mut term) = (0.0, 0.0, x);
+        for n in 0..60 {
+            let k = f64::from(n);
+            if n % 2 == 0 {
+                c += if n % 4 == 0 { term } else { -term } / (2.0 * k + 1.0);
+            } else {
+                s += if n % 4 == 1 { term } else { -term } / (2.0 * k + 1.0);
+            }
+            term *= q / (k + 1.0);
+        }
+        (c, s)
+    }
+
+    /// Length of the parabola `v = c u²` from 0 to u.
+    fn parabola_length(c: f64, u: f64) -> f64 {
+        0.5 * u * (1.0 + 4.0 * c * c * u * u).sqrt() + (2.0 * c * u).asinh() / (4.0 * c)
+    }
+
+    #[test]
+    fn an_arc_is_a_circle() {
+        for k in [1.0 / 600.0, -0.02, 1e-9] {
+            let j = at(Shape::Arc { curvature_1_m: k }, 300.0, 250.0);
+            near(j.point[0], (k * 250.0).sin() / k, 1e-9);
+            near(j.point[1], 2.0 * (k * 125.0).sin().powi(2) / k, 1e-9);
+            near(libm::remainder(j.heading_rad() - k * 250.0, 2.0 * PI), 0.0, 1e-12);
+            near(j.curvature_1_m(), k, 1e-15);
+        }
+    }
+
+    #[test]
+    fn a_clothoid_ends_where_the_fresnel_series_says() {
+        for (length, k) in [(150.0, 1.0 / 600.0), (80.0, -1.0 / 40.0), (40.0, 0.2)] {
+            let j = at(Shape::Spiral { start_1_m: 0.0, end_1_m: k }, length, length);
+            let scale = (PI * length / f64::abs(k)).sqrt();
+            let (c, s) = fresnel(length / scale);
+            near(j.point[0], scale * c, 1e-9);
+            near(j.point[1], k.signum() * scale * s, 1e-9);
+            near(j.first[0], (0.5 * k * length).cos(), 1e-12);
+            near(j.curvature_1_m(), k, 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_clothoid_between_two_curvatures_is_a_part_of_one_from_zero() {
+        let rate = 1e-4;
+        let whole = at(Shape::Spiral { start_1_m: 0.0, end_1_m: rate * 200.0 }, 200.0, 200.0);
+        let first = Placed {
+            s_m: 0.0,
+            x_m: 0.0,
+            y_m: 0.0,
+            heading_rad: 0.0,
+            length_m: 120.0,
+            shape: Shape::Spiral { start_1_m: 0.0, end_1_m: rate * 120.0 },
+        };
+        let joint = first.at(120.0);
+        let second = Placed {
+            s_m: 120.0,
+            x_m: joint.point[0],
+            y_m: joint.point[1],
+            heading_rad: joint.heading_rad(),
+            length_m: 80.0,
+            shape: Shape::Spiral { start_1_m: rate * 120.0, end_1_m: rate * 200.0 },
+        };
+        let end = second.at(80.0);
+        near(end.point[0], whole.point[0], 1e-9);
+        near(end.point[1], whole.point[1], 1e-9);
+    }
+
+    #[test]
+    fn a_poly3_parabola_has_the_parabolas_arc_length() {
+        let c = 0.004;
+        for u in [5.0, 60.0, 120.0] {
+            let j = at(Shape::Poly3 { v: [0.0, 0.0, c, 0.0] }, 150.0, parabola_length(c, u));
+            near(j.point[0], u, 1e-9);
+            near(j.point[1], c * u * u, 1e-9);
+            near(j.curvature_1_m(), 2.0 * c / (1.0 + 4.0 * c * c * u * u).powf(1.5), 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_param_poly3_runs_by_arc_length_in_both_ranges() {
+        let (c, u_end) = (0.004, 100.0);
+        let length = parabola_length(c, u_end);
+        let by_unit = Shape::ParamPoly3 {
+            u: [0.0, u_end, 0.0, 0.0],
+            v: [0.0, 0.0, c * u_end * u_end, 0.0],
+            normalized: true,
+        };
+        let k = u_end / length;
+        let by_length = Shape::ParamPoly3 {
+            u: [0.0, k, 0.0, 0.0],
+            v: [0.0, 0.0, c * k * k, 0.0],
+            normalized: false,
+        };
+        for shape in [by_unit, by_length] {
+            for u in [0.0, 20.0, 77.0, 100.0] {
+                let j = at(shape, length, parabola_length(c, u));
+                near(j.point[0], u, 1e-9);
+                near(j.point[1], c * u * u, 1e-9);
+                near(libm::hypot(j.first[0], j.first[1]), 1.0, 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_param_poly3_whose_stated_length_is_off_still_meets_its_end() {
+        let shape = Shape::ParamPoly3 {
+            u: [0.0, 100.0, 0.0, 0.0],
+            v: [0.0, 0.0, 10.0, 0.0],
+            normalized: true,
+        };
+        let end = at(shape, 98.0, 98.0);
+        near(end.point[0], 100.0, 1e-9);
+        near(end.point[1], 10.0, 1e-9);
+    }
+
+    #[test]
+    fn derivatives_are_those_of_the_position() {
+        let shapes = [
+            Shape::Line,
+            Shape::Arc { curvature_1_m: -0.01 },
+            Shape::Spiral { start_1_m: 0.01, end_1_m: -0.02 },
+            Shape::Poly3 { v: [0.5, 0.1, -0.002, 1e-5] },
+            Shape::ParamPoly3 {
+                u: [0.0, 90.0, 5.0, -3.0],
+                v: [0.0, 0.0, 12.0, -5.0],
+                normalized: true,
+            },
+        ];
+        for shape in shapes {
+            for ds in [10.0, 45.0, 80.0] {
+                let h = 1e-3;
+                let (a, j, b) =
+                    (at(shape, 95.0, ds - h), at(shape, 95.0, ds), at(shape, 95.0, ds + h));
+                for i in 0..2 {
+                    near((b.point[i] - a.point[i]) / (2.0 * h), j.first[i], 1e-7);
+                    near((b.first[i] - a.first[i]) / (2.0 * h), j.second[i], 1e-7);
+                }
+            }
+        }
+    }
 }

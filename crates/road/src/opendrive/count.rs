@@ -60,7 +60,10 @@ const READ: [&str; 36] = [
 pub(super) type Counts = BTreeMap<String, (usize, u32)>;
 
 /// Counts objects and signals by type, and elements that are not read.
-pub(super) fn counts(root: Node<'_, '_>) -> (BTreeMap<String, usize>, Counts, Counts) {
+pub(super) fn counts(
+    source: &Source<'_>,
+    root: Node<'_, '_>,
+) -> (BTreeMap<String, usize>, Counts, Counts) {
     let (mut objects, mut unsupported, mut ignored) =
         (BTreeMap::new(), Counts::new(), Counts::new());
     for n in root.descendants().filter(Node::is_element) {
@@ -83,7 +86,7 @@ pub(super) fn counts(root: Node<'_, '_>) -> (BTreeMap<String, usize>, Counts, Co
         } else {
             &mut ignored
         };
-        counter.entry(name.to_string()).or_insert_with(|| (0, Source::line(n))).0 += 1;
+        counter.entry(name.to_string()).or_insert_with(|| (0, source.line(n))).0 += 1;
     }
     (objects, unsupported, ignored)
 }

@@ -13,12 +13,12 @@ use crate::bake::Baker;
 use crate::{Cubics, Line, Placed, RoadError, RoadObject, Shape};
 
 /// Larger files are refused, bytes.
-const MAX_BYTES: u64 = 256 << 20;
+const MAX_BYTES: u64 = 128 << 20;
 const MAX_XML_NODES: u32 = 20_000_000;
 /// A longer road is taken for a mistake, m.
 const MAX_ROAD_M: f64 = 1e6;
 /// A longer map is taken for a mistake, m.
-const MAX_TOTAL_M: f64 = 5e7;
+const MAX_TOTAL_M: f64 = 1e7;
 /// More turning in one element than this is taken for a mistake, rad.
 const MAX_TURN_RAD: f64 = 200.0;
 
@@ -54,7 +54,7 @@ impl Network {
                 why,
             }
         })?;
-        let (source, root) = (Source { name }, doc.root_element());
+        let (source, root) = (Source::new(name, &text), doc.root_element());
         if root.tag_name().name() != "OpenDRIVE" {
             return Err(source.error(root, "the root element must be <OpenDRIVE>"));
         }
@@ -78,7 +78,7 @@ impl Network {
         }
         let junctions =
             children(root, "junction").map(|n| junction(&source, n)).collect::<Result<_, _>>()?;
-        let (objects, unsupported, ignored) = counts(root);
+        let (objects, unsupported, ignored) = counts(&source, root);
         Ok(Self { name: name.into(), header, roads, junctions, objects, unsupported, ignored })
     }
 }
@@ -150,7 +150,7 @@ fn road(source: &Source<'_>, node: Node<'_, '_>) -> Result<RoadRecord, RoadError
     Ok(RoadRecord {
         id: source.text(node, "id")?.into(),
         name: node.attribute("name").unwrap_or("").into(),
-        file_line: Source::line(node),
+        file_line: source.line(node),
         length_m,
         junction: node.attribute("junction").filter(|j| !matches!(*j, "-1" | "")).map(Into::into),
         left_hand: node.attribute("rule") == Some("LHT"),
@@ -197,7 +197,13 @@ fn plan(source: &Source<'_>, node: Node<'_, '_>) -> Result<Vec<Placed>, RoadErro
         }
         let shape = shape(source, g, placed.length_m)?;
         if placed.length_m > 1e-6 {
-            out.push(Placed { shape, ..placed });
+            let placed = Placed { shape, ..placed };
+            if let Some(curve_m) = placed.odd_length_m() {
+                let why =
+                    format!("length = {}, but the curve is {curve_m} m long", placed.length_m);
+                return Err(source.error(g, why));
+            }
+            out.push(placed);
         }
     }
     if out.is_empty() {
@@ -331,7 +337,7 @@ fn junction(source: &Source<'_>, node: Node<'_, '_>) -> Result<Junction, RoadErr
         id: source.text(node, "id")?.into(),
         name: node.attribute("name").unwrap_or("").into(),
         direct,
-        file_line: Source::line(node),
+        file_line: source.line(node),
         connections,
     })
 }

@@ -7,21 +7,26 @@ use crate::RoadError;
 /// Larger numbers are taken for a mistake: no map reaches them.
 const LARGEST: f64 = 1e9;
 
-/// Names the file in errors.
-#[derive(Clone, Copy)]
+/// The file: its name for errors, and where its lines begin.
 pub(super) struct Source<'a> {
-    pub(super) name: &'a str,
+    name: &'a str,
+    line_starts: Vec<usize>,
 }
 
-impl Source<'_> {
-    pub(super) fn line(node: Node<'_, '_>) -> u32 {
-        node.document().text_pos_at(node.range().start).row
+impl<'a> Source<'a> {
+    pub(super) fn new(name: &'a str, text: &str) -> Self {
+        Self { name, line_starts: text.match_indices('\n').map(|(i, _)| i + 1).collect() }
+    }
+
+    /// Line of an element, from 1.
+    pub(super) fn line(&self, node: Node<'_, '_>) -> u32 {
+        1 + self.line_starts.partition_point(|&i| i <= node.range().start) as u32
     }
 
     pub(super) fn error(&self, node: Node<'_, '_>, why: impl Into<String>) -> RoadError {
         RoadError::OpenDrive {
             path: self.name.into(),
-            line: Self::line(node),
+            line: self.line(node),
             element: node.tag_name().name().into(),
             why: why.into(),
         }
