@@ -7,23 +7,23 @@ use tractrix_core::{BrakeMode, Command};
 
 /// How well a trace was met.
 #[derive(Debug, Clone, Copy)]
-pub struct Agreement {
+pub(crate) struct Agreement {
     /// `1 - mean|sim - ref| / mean|ref|` of the speed.
-    pub speed_accuracy_frac: f64,
+    pub(crate) speed_accuracy_frac: f64,
     /// Share of samples in the same gear (samples during shifts left out).
-    pub gear_frac: f64,
+    pub(crate) gear_frac: f64,
     /// Speed at the end, m/s: of the simulation and of the trace.
-    pub final_speed_m_s: (f64, f64),
+    pub(crate) final_speed_m_s: (f64, f64),
 }
 
 /// Mass in a trace's name, e.g. `accel_pedal40_18t.csv`, kg.
-pub fn mass_in_name_kg(path: &Path) -> Option<f64> {
+pub(crate) fn mass_in_name_kg(path: &Path) -> Option<f64> {
     let stem = path.file_stem()?.to_str()?;
     stem.split('_').find_map(|w| w.strip_suffix('t')?.parse::<f64>().ok()).map(|t| t * 1_000.0)
 }
 
 /// Columns `t_s, pedal_pct, xbr_mps2, ctrl_mode, steer_rad, grade_deg, gear, shift, v_kph`.
-pub fn replay(
+pub(crate) fn replay(
     truck: &str,
     path: &Path,
     mass_kg: f64,
