@@ -40,7 +40,7 @@ impl MemoryRecorder {
 
 impl Recorder for MemoryRecorder {
     fn record(&mut self, tick: &Tick<'_>) {
-        if self.seen % self.every == 0 {
+        if self.seen.is_multiple_of(self.every) {
             self.records.push(MemoryRecord {
                 time: tick.now,
                 ego: *tick.ego,

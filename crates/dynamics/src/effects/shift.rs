@@ -193,7 +193,7 @@ impl ShiftParameters {
         let at = |pair: [f64; 2]| (pair[0] + view.pedal_frac * (pair[1] - pair[0])) / RPM_PER_RAD_S;
         let now = usize::from(gear).clamp(1, top);
         let n = speed_in(now);
-        let braking = view.retarder_frac > 0.05 || view.brake_decel_m_s2 > 0.3;
+        let braking = view.retarder_frac > 0.3 || view.brake_decel_m_s2 > 0.8;
         let (up, down) = if braking {
             (0.97 * view.max_rad_s, self.braking_speed_rpm / RPM_PER_RAD_S)
         } else {
