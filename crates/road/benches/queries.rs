@@ -20,6 +20,13 @@ fn queries(c: &mut Criterion) {
         i = (i + 1) % 1_000;
         i
     };
+    let mut s = 0.0;
+    c.bench_function("at_along_the_road", |b| {
+        b.iter(|| {
+            s = if s < 14_999.0 { s + 0.1 } else { 0.0 };
+            road.at(black_box(s), -1.9)
+        });
+    });
     c.bench_function("at", |b| b.iter(|| road.at(black_box(stations[next()]), -1.9)));
     c.bench_function("lane_at", |b| b.iter(|| road.lane_at(black_box(stations[next()]), -1.9)));
     c.bench_function("project_near_hint", |b| {

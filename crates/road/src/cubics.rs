@@ -189,12 +189,18 @@ impl Cubics {
     }
 }
 
-/// Index of the last start at or before `s` (0 if none): a guess as if the starts were evenly
-/// spaced, a few steps from it, and bisection where they are not.
+/// Tables up to this length are bisected.
+const SHORT_TABLE: usize = 64;
+
+/// Index of the last start at or before `s` (0 if none): by bisection for short tables, else a guess
+/// as if the starts were evenly spaced, a few steps from it, and bisection where they are not.
 fn locate(starts: &[f64], s: f64) -> usize {
     let last = starts.len() - 1;
     if last == 0 || !(s > starts[0]) {
         return 0;
+    }
+    if last < SHORT_TABLE {
+        return starts.partition_point(|&v| v <= s) - 1;
     }
     let share = (s - starts[0]) / (starts[last] - starts[0]);
     let mut i = ((share * last as f64) as usize).min(last);
@@ -241,7 +247,8 @@ mod tests {
 
     #[test]
     fn pieces_are_found_however_unevenly_they_lie() {
-        let starts = [0.0, 0.1, 0.2, 0.3, 5.0, 5.5, 100.0, 1_000.0, 1_000.5, 5_000.0];
+        let mut starts = vec![0.0, 0.1, 0.2, 0.3, 5.0, 5.5, 100.0, 1_000.0, 1_000.5];
+        starts.extend((0..90).map(|i| 1_100.0 + f64::from(i * i)));
         for i in -10..60_000 {
             let s = f64::from(i) * 0.1;
             let expected = starts.iter().rposition(|v| *v <= s).unwrap_or(0);
