@@ -28,6 +28,7 @@ pub mod pcc;
 pub mod reference_speed;
 pub mod road_load;
 pub mod rss;
+mod speed_profile;
 mod stack;
 pub mod surroundings;
 #[cfg(test)]
@@ -38,4 +39,5 @@ pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};
 pub use decider::{DeciderKind, LaneChoice};
 pub use drive::{DriveError, TickOutcome, drive_tick};
 pub use error::PlannerError;
+pub use speed_profile::SpeedProfile;
 pub use stack::Stack;

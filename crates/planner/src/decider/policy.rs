@@ -8,7 +8,6 @@
 //! the decision. A policy trained on another observation, or torn weights, are refused.
 
 use alloc::format;
-use alloc::string::ToString;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -177,7 +176,7 @@ impl Sidecar {
         let mut seen = self.actions;
         seen.sort_by_key(|a| *a as u8);
         if seen != [LaneChoice::Left, LaneChoice::Keep, LaneChoice::Right] {
-            return Err(bad("policy.json: actions must be left, keep and right".to_string()));
+            return Err(bad("policy.json: actions must be left, keep and right".into()));
         }
         Ok(self.actions)
     }

@@ -3,6 +3,7 @@
 use alloc::vec::Vec;
 
 use super::{Stack, grade, wrapped};
+use crate::SpeedPlannerKind;
 use crate::decider::{DeciderKind, LaneChoice, View, lane_ends, leave_ending_lane, mobil, rules};
 use crate::following::{Following, follow};
 use crate::lateral::{PREVIEW_POINTS, PREVIEW_STEP_S, PathError};
@@ -92,10 +93,19 @@ impl Stack {
             obey_speed_limits: self.config.obey_speed_limits,
             curve_accel_m_s2: self.config.curve_accel_m_s2,
         };
-        self.reference.update(road, lane, ego.s_m, &limits.geometry, &bounds, |_| None);
+        let profile = match self.config.speed_planner {
+            SpeedPlannerKind::Predictive => self.profile.as_ref(),
+            SpeedPlannerKind::Cruise => None,
+        };
+        let planned = |s_m: f64| profile.and_then(|p| p.at(s_m));
+        self.reference.update(road, lane, ego.s_m, &limits.geometry, &bounds, planned);
+        self.plan.speed_status = match (self.config.speed_planner, profile) {
+            (SpeedPlannerKind::Cruise, _) => PlanStatus::Cruise,
+            (SpeedPlannerKind::Predictive, Some(p)) if p.at(ego.s_m).is_some() => p.status(),
+            (SpeedPlannerKind::Predictive, _) => PlanStatus::Fallback,
+        };
         self.plan.speed.clear();
         self.plan.speed.extend_from_slice(self.reference.points());
-        self.plan.speed_status = PlanStatus::Cruise;
     }
 
     /// Checks the change under way and looks at what is wished.

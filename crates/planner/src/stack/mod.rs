@@ -14,7 +14,7 @@ use crate::longitudinal::LongitudinalController;
 use crate::maneuver::ManeuverPlanner;
 use crate::observation::Observer;
 use crate::reference_speed::ReferenceSpeed;
-use crate::{PlannerError, StackConfig};
+use crate::{PlannerError, SpeedProfile, StackConfig};
 use road::Road;
 use tractrix_core::{EgoState, Maneuver, Plan, Scene, Stamped, Time, VehicleLimits};
 
@@ -34,6 +34,7 @@ pub struct Stack {
     wish: LaneChoice,
     policy: Option<Arc<Policy>>,
     observer: Observer,
+    profile: Option<SpeedProfile>,
     estimator: LoadEstimator,
     /// The truck's limits with the estimated load, once there is a valid estimate.
     estimated: Option<VehicleLimits>,
@@ -85,6 +86,7 @@ impl Stack {
             wish: LaneChoice::Keep,
             policy,
             observer: Observer::new(rates.tick_s * f64::from(rates.path_ticks)),
+            profile: None,
             estimator: LoadEstimator::new(config.estimator, &limits.road_load),
             estimated: None,
             plan: Plan::default(),
@@ -115,6 +117,13 @@ impl Stack {
         if speed_m_s.is_finite() {
             self.config.set_speed_m_s = speed_m_s.clamp(0.0, 40.0);
         }
+    }
+
+    /// Gives the stack a planned speed profile (speed planner `predictive`); it replaces the former
+    /// one. Where it has no speed, and without one, the set speed is the reference and the plan's
+    /// status is [`tractrix_core::PlanStatus::Fallback`].
+    pub fn set_speed_profile(&mut self, profile: Option<SpeedProfile>) {
+        self.profile = profile;
     }
 
     /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick.
