@@ -91,7 +91,7 @@ export class Strips {
       const bottom = Math.max(0, top - row.share * unit);
       layout[i === 0 ? "yaxis" : `yaxis${i + 1}`] = {
         domain: [bottom, top], title: { text: row.title, standoff: 8 }, gridcolor: "#1c252f",
-        zerolinecolor: "#2f3b48", nticks: 4, fixedrange: true, rangemode: i === 1 ? "normal" : "tozero",
+        zerolinecolor: "#2f3b48", nticks: 4, fixedrange: true, rangemode: ["nonnegative", "normal", "tozero", "tozero", "tozero"][i],
         ...(row.title === "gear" ? { range: [0, 12.9], tickvals: [0, 4, 8, 12] } : {}),
       };
       top = bottom - GAP;

@@ -2,7 +2,7 @@
 // The truck stays in place and drives to the right; map coordinates are metres, y to the left.
 
 const COLOR = {
-  ground: "#0c1116", dot: "#1c2630", verge: "#10191a", asphalt: "#272e37", ramp: "#222932", shoulder: "#1c2229", paint: "#c9d3dd",
+  ground: "#0c1116", dot: "#2a3744", verge: "#10191a", asphalt: "#272e37", ramp: "#222932", shoulder: "#1c2229", paint: "#c9d3dd",
   tractor: "#2f9df4", cab: "#0f4f86", trailer: "#c8d2dc", edge: "#0a0e13", wheel: "#040608", rim: "#6d7a88", frame: "#41566a",
   car: "#f0a742", van: "#c98bea", truck: "#8fa3b8", followed: "#ff5d6c", path: "#39c5ff", text: "#8b99a8",
 };
