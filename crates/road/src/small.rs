@@ -6,7 +6,7 @@ const SMALL: f64 = 0.1;
 
 /// Arc tangent; first term left out: `x¹⁷/17 < 6e-19`.
 pub(crate) fn atan(x: f64) -> f64 {
-    if libm::fabs(x) > SMALL {
+    if x.abs() > SMALL {
         return libm::atan(x);
     }
     let q = -x * x;
@@ -16,7 +16,7 @@ pub(crate) fn atan(x: f64) -> f64 {
 
 /// Sine and cosine; first terms left out: `x¹¹/11! < 3e-19`, `x¹²/12! < 3e-21`.
 pub(crate) fn sincos(x: f64) -> (f64, f64) {
-    if libm::fabs(x) > SMALL {
+    if x.abs() > SMALL {
         return libm::sincos(x);
     }
     let q = -x * x;
