@@ -61,7 +61,7 @@ function show(f) {
   text("error", signed(plan.lateral_error_m * 100, 1));
   text("error-sub", `max ${(run.max_lateral_error_m * 100).toFixed(1)}`);
   text("hitch", signed(ego.articulation_rad * 180 / Math.PI, 2));
-  text("hitch-sub", `steer ${signed(ego.steering_wheel_rad * 180 / Math.PI, 0)}° at the wheel`);
+  text("hitch-sub", `steer ${signed(ego.steering_wheel_rad * 180 / Math.PI, 0)}°`);
   text("power", (ego.engine_power_w / 1000).toFixed(0));
   text("power-sub", braking(ego) || `pedal ${(plan.accelerator_pedal_frac * 100).toFixed(0)} % · ${ego.engine_torque_nm.toFixed(0)} Nm`);
   text("fuel", (ego.fuel_used_g / 1000).toFixed(2));
