@@ -52,39 +52,10 @@ fn truck() -> Geometry {
     }
 }
 
-/// OpenDRIVE of `builtin::flat`: straight, two lanes of the width of ours, limit 25 m/s.
-fn flat_xodr(folder: &Path, length_m: f64) -> PathBuf {
-    let road = builtin::flat(length_m);
-    let w = road.lanes()[0].width_m(0.0);
-    let right_edge =
-        road.lanes().iter().map(|l| l.center_d_m(0.0)).fold(f64::INFINITY, f64::min) - 0.5 * w;
-    let offset = right_edge + 2.0 * w;
-    let lane = |k: i32| {
-        format!(
-            "<lane id=\"{k}\" type=\"driving\" level=\"false\"><width sOffset=\"0\" a=\"{w}\" b=\"0\" c=\"0\" d=\"0\"/>\
-             <speed sOffset=\"0\" max=\"25\" unit=\"m/s\"/></lane>"
-        )
-    };
-    let text = format!(
-        "<?xml version=\"1.0\"?><OpenDRIVE><header revMajor=\"1\" revMinor=\"6\" name=\"flat\" version=\"1\"/>\
-         <road name=\"flat\" length=\"{length_m}\" id=\"1\" junction=\"-1\"><planView>\
-         <geometry s=\"0\" x=\"0\" y=\"0\" hdg=\"0\" length=\"{length_m}\"><line/></geometry></planView>\
-         <lanes><laneOffset s=\"0\" a=\"{offset}\" b=\"0\" c=\"0\" d=\"0\"/><laneSection s=\"0\">\
-         <center><lane id=\"0\" type=\"none\" level=\"false\"/></center><right>{}{}</right></laneSection></lanes>\
-         </road></OpenDRIVE>",
-        lane(-1),
-        lane(-2)
-    );
-    let path = folder.join("flat.xodr");
-    std::fs::write(&path, text).unwrap();
-    path
-}
-
 fn flat_traffic(folder: &Folder, traffic: TrafficConfig) -> (Arc<Road>, SumoTraffic) {
     let road = Arc::new(builtin::flat(4000.0));
-    let xodr = flat_xodr(&folder.0, 4000.0);
     let config = SumoConfig { traffic, ..SumoConfig::default() };
-    let sumo = SumoTraffic::new(road.clone(), &xodr, truck(), config, &folder.0).unwrap();
+    let sumo = SumoTraffic::new(road.clone(), truck(), config, &folder.0).unwrap();
     (road, sumo)
 }
 
@@ -126,7 +97,7 @@ fn sumo_traffic_drives_around_the_ego_on_our_road() {
     let folder = Folder::new("drives");
     let (road, mut sumo) = flat_traffic(&folder, TrafficConfig::family(Density::Medium, 15.0, 3));
     assert!(sumo.import().worst_m < 0.01, "{:?}", sumo.import());
-    assert_eq!(sumo.import().lanes, 2);
+    assert_eq!(sumo.import().lanes, 8, "four edges of two lanes");
     let mut seen = std::collections::BTreeSet::new();
     let mut last: std::collections::BTreeMap<u64, f64> = Default::default();
     drive(&mut sumo, &road, 600, |_, scene| {
@@ -283,4 +254,31 @@ fn types_routes_and_traffic_lights_are_reachable() {
 fn an_absent_sumo_is_named_with_how_to_get_it() {
     let e = Programs::find(Some(Path::new("/nowhere/sumo"))).unwrap_err().to_string();
     assert!(e.contains("/nowhere/sumo") && e.contains("pip install eclipse-sumo"), "{e}");
+}
+
+#[test]
+fn the_highway_with_its_ramps_is_imported_within_a_decimetre_and_traffic_uses_all_lanes() {
+    if !sumo_is_here() {
+        return;
+    }
+    let folder = Folder::new("highway");
+    let road = Arc::new(builtin::highway());
+    let traffic = TrafficConfig {
+        ramp_spawn_probability: 0.03,
+        scene_radius_m: 2000.0,
+        ..TrafficConfig::family(Density::Medium, 25.0, 4)
+    };
+    let config = SumoConfig { traffic, ..SumoConfig::default() };
+    let mut sumo = SumoTraffic::new(road.clone(), truck(), config, &folder.0).unwrap();
+    let import = sumo.import().clone();
+    assert!(import.worst_m < 0.05 && import.points > 1000, "{import:?}");
+    let mut lanes = std::collections::BTreeSet::new();
+    for k in 0..300 {
+        let s_m = 3200.0 + 2.0 * k as f64;
+        let right = road.lanes().iter().find(|l| l.s_start_m == 0.0).unwrap();
+        let ego = ego_at(&road, s_m, right.center_d_m(s_m), 20.0);
+        let scene = sumo.advance(Time(k * 100_000_000), &ego).unwrap();
+        lanes.extend(scene.neighbours.iter().map(|n| n.lane));
+    }
+    assert!(lanes.len() >= 3, "{lanes:?}");
 }

@@ -11,6 +11,7 @@ mod demand;
 mod error;
 pub mod link;
 pub mod network;
+mod plain;
 pub mod process;
 pub mod session;
 mod source;

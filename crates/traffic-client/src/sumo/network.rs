@@ -1,27 +1,27 @@
-//! SUMO's private copy of the road: made by `netconvert` from OpenDRIVE, read back, checked.
+//! SUMO's private copy of the road: written by us, made by `netconvert`, read back, checked.
 //!
-//! Only the names and the plan view are taken from it. Height, bank and lane geometry stay ours:
-//! netconvert drops superelevation and road-type speed limits and turns tapers into steps. The only
-//! safe way from a SUMO lane to an OpenDRIVE lane is its `origId` parameter
-//! (`--output.original-names`).
+//! Only the names and the plan view are taken from it. Height, bank and lane geometry stay ours.
+//! The safe way from a SUMO lane to our lane track is its `origId` parameter.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
+use road::Road;
+
 use super::error::SumoError;
+use super::plain::plain;
 use super::process::Programs;
 
-/// Options of the import; coarse polylines, because SUMO walks them linearly.
-const OPTIONS: [&str; 9] = [
-    "--opendrive.curve-resolution",
-    "10",
+/// Options of the import.
+const OPTIONS: [&str; 8] = [
     "--offset.disable-normalization",
-    "--output.original-names",
     "--precision",
     "4",
     "--no-turnarounds",
-    "--junctions.endpoint-shape",
-    "--opendrive.internal-shapes",
+    "--junctions.limit-turn-speed",
+    "-1",
+    "--default.junctions.radius",
+    "0",
 ];
 
 /// One lane of the network.
@@ -33,7 +33,7 @@ pub struct SumoLane {
     pub edge: String,
     /// Index on the edge, 0 = rightmost.
     pub index: u32,
-    /// OpenDRIVE lanes that it stands for, `road_lane`.
+    /// Lane tracks that it stands for, by their index.
     pub original: Vec<String>,
     /// Length as SUMO uses it, m.
     pub length_m: f64,
@@ -56,15 +56,26 @@ pub struct Network {
     pub next: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// Runs netconvert on an OpenDRIVE file and reads the result.
+/// Brings a road into SUMO: writes plain files into `folder`, runs netconvert, reads the result.
 ///
 /// # Errors
-/// [`SumoError::NetConvert`] with its words, [`SumoError::Map`] if its output is unusable.
-pub fn convert(programs: &Programs, xodr: &Path, net: &Path) -> Result<Network, SumoError> {
+/// [`SumoError::NetConvert`] with its words, [`SumoError::Map`] if its output is unusable,
+/// [`SumoError::File`].
+pub fn convert(programs: &Programs, road: &Road, folder: &Path) -> Result<Network, SumoError> {
+    let text = plain(road);
+    let write = |name: &str, text: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(|e| file_error(&path, &e)).map(|()| path)
+    };
+    let net = &folder.join("road.net.xml");
     let out = programs
         .command(&programs.netconvert)
-        .arg("--opendrive-files")
-        .arg(xodr)
+        .arg("--node-files")
+        .arg(write("road.nod.xml", &text.nodes)?)
+        .arg("--edge-files")
+        .arg(write("road.edg.xml", &text.edges)?)
+        .arg("--connection-files")
+        .arg(write("road.con.xml", &text.connections)?)
         .arg("-o")
         .arg(net)
         .args(OPTIONS)

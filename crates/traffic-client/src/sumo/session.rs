@@ -244,7 +244,12 @@ impl Session {
 
     /// One simulation step; the last command of a request.
     pub fn step(&mut self) -> &mut Self {
-        self.writer.begin(id::STEP).f64(0.0).end();
+        self.step_to(0.0)
+    }
+
+    /// Steps up to a time, s (0: one step); the last command of a request.
+    pub fn step_to(&mut self, time_s: f64) -> &mut Self {
+        self.writer.begin(id::STEP).f64(time_s).end();
         self.expect(id::STEP, 0, Expect::Step)
     }
 

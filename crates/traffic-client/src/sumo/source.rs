@@ -81,21 +81,20 @@ pub struct SumoTraffic {
 }
 
 impl SumoTraffic {
-    /// Brings the road into SUMO: converts the OpenDRIVE file `xodr` of `road`, checks every lane.
-    /// Working files go into `folder`, which exists. SUMO starts with the first scene.
+    /// Brings the road into SUMO: written, converted, every lane checked. Working files
+    /// go into `folder`, which exists. SUMO starts with the first scene.
     ///
     /// # Errors
     /// [`TrafficError`] for the configuration, a missing SUMO, and an import that does not fit.
     pub fn new(
         road: Arc<Road>,
-        xodr: &Path,
         geometry: Geometry,
         config: SumoConfig,
         folder: &Path,
     ) -> Result<Self, TrafficError> {
         config.traffic.validate()?;
         let programs = Programs::find(config.binary.as_deref())?;
-        let network = convert(&programs, xodr, &folder.join("road.net.xml"))?;
+        let network = convert(&programs, &road, folder)?;
         let import = check(&network, &road)?;
         let map = lane_map(&road)?;
         Ok(Self {
