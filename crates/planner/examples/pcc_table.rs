@@ -10,13 +10,15 @@ mod data_sheet;
 #[path = "../tests/support/pcc/dp.rs"]
 mod dp;
 
-use planner::pcc::clarabel_backend;
 use planner::pcc::course::{SpeedBand, Tuning};
+use planner::pcc::solver::DefaultSolver;
 use planner::pcc::trip::{Trip, TripRequest};
 use std::time::Instant;
 
 fn main() {
-    let only = std::env::args().nth(1).filter(|a| a != "--fine");
+    let mut solver = DefaultSolver::default();
+    let mut solve = |a: &_, b, c, d: Option<&[f64]>| solver.solve(a, b, c, d);
+    let only = std::env::args().nth(1).filter(|a| !a.starts_with("--"));
     println!(
         "road mass band | T cc0 | fuel cc0 cc5 | plan fuel time shifts brk | dp fuel time shifts | gap % | sqp it ms | dp s"
     );
@@ -28,6 +30,13 @@ fn main() {
             for (lo, hi) in [(65.0, 79.0), (60.0, 85.0), (50.0, 90.0)] {
                 let mut limits = data_sheet::reference_limits();
                 limits.road_load.mass_kg = mass;
+                if std::env::args().any(|a| a == "--linear") {
+                    limits.powertrain.fuel = tractrix_core::FuelModel::Willans {
+                        constant_g_s: 0.0,
+                        per_rpm_g_s: 0.0,
+                        per_kw_g_s: 0.052,
+                    };
+                }
                 let request = TripRequest {
                     profile: &profile,
                     truck: &limits,
@@ -50,14 +59,24 @@ fn main() {
                 let (goal, end) = reference.as_ref().map_or((time, end), |r| {
                     (r.driven.trip_time_s(), *r.driven.e_j_kg.last().unwrap())
                 });
+                let cc = (trip.cruise.total_fuel_g(), trip.overspeed.total_fuel_g());
+                let over = &trip.overspeed;
+                let (vs5, _) =
+                    trip.solve(over.trip_time_s(), *over.e_j_kg.last().unwrap(), &mut solve);
+                let (vs0, _) = trip.solve(time, end, &mut solve);
+                let savings = format!(
+                    "saves {:.2}/{:.2}",
+                    100.0 * (1.0 - vs0.total_fuel_g() / cc.0),
+                    100.0 * (1.0 - vs5.total_fuel_g() / cc.1)
+                );
                 let t0 = Instant::now();
-                let (d, profile) = trip.solve(goal, end, &mut clarabel_backend::solve);
+                let (d, profile) = trip.solve(goal, end, &mut solve);
                 let ms = t0.elapsed().as_secs_f64() * 1e3;
                 let (rf, rt, rs) = reference.as_ref().map_or((0.0, 0.0, 0), |r| {
                     (r.driven.total_fuel_g(), r.driven.trip_time_s(), r.driven.shifts())
                 });
                 println!(
-                    "{name:9} {:2.0} {lo}-{hi} | {time:7.2} | {:7.1} {:7.1} | {:7.1} {:7.2} {:2} {:5.2} | {rf:7.1} {rt:7.2} {rs:2} b{:.2}/{:.2} | {:+.3} dt {:+.4} % | {:?} {} {} {ms:.1} viol {:.1e} | {dp_s:.2}",
+                    "{name:9} {:2.0} {lo}-{hi} | {time:7.2} | {:7.1} {:7.1} | {:7.1} {:7.2} {:2} {:5.2} | {rf:7.1} {rt:7.2} {rs:2} b{:.2}/{:.2} | {:+.3} dt {:+.4} % | {savings} | {:?} {} {} {ms:.1} viol {:.1e} | {dp_s:.2}",
                     mass / 1e3,
                     trip.cruise.total_fuel_g(),
                     trip.overspeed.total_fuel_g(),

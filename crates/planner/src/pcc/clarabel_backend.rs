@@ -1,6 +1,6 @@
 //! The subproblem through Clarabel (interior point, homogeneous embedding): default and oracle.
 //!
-//! Unknowns `E_1..E_N`, `b_0..b_{N-1}`, then one slack of a soft end, then `t_1..t_N` when a fence
+//! Unknowns `E_1..E_N`, `b_0..b_{N-1}`, `u_0..u_{N-1}`, then one slack of a soft end, then `t_1..t_N` when a fence
 //! asks for elapsed times. Clarabel cannot start from the last solution (0.11); a solve costs the
 //! same every time.
 
@@ -38,6 +38,7 @@ pub struct Programme {
 struct Rows {
     p_low: usize,
     p_high: usize,
+    u_low: usize,
     time: Option<usize>,
 }
 
@@ -75,8 +76,8 @@ impl Programme {
         let n = sub.n;
         let mut m = Self::default();
         let soft = matches!(terminal, Terminal::Soft { .. });
-        let slack = 2 * n;
-        let t_first = 2 * n + usize::from(soft);
+        let slack = 3 * n;
+        let t_first = 3 * n + usize::from(soft);
         m.columns = t_first + if fence_s.is_some() { n } else { 0 };
         let mut quad = Quadratic::default();
         quad.assemble(sub, if let TimeRule::Price(beta) = time { beta } else { 0.0 });
@@ -96,6 +97,7 @@ impl Programme {
             }
             m.q[i] = quad.ge[i];
             m.q[n + i] = quad.gb[i];
+            m.q[2 * n + i] = -sub.discount[i];
         }
         // Equalities first.
         let mut row = 0;
@@ -171,7 +173,19 @@ impl Programme {
             }
             self.b.push(right);
         }
-        let mut row = first + 2 * n;
+        let u_low = first + 2 * n;
+        for k in 0..n {
+            // u - p <= 0
+            self.entry(u_low + k, 2 * n + k, 1.0);
+            self.entry(u_low + k, k, -sub.a1[k]);
+            self.entry(u_low + k, n + k, -1.0);
+            let known = if k == 0 { sub.a0[0] * sub.start_e } else { 0.0 };
+            if k > 0 {
+                self.entry(u_low + k, k - 1, -sub.a0[k]);
+            }
+            self.b.push(sub.r[k] + known);
+        }
+        let mut row = first + 3 * n;
         let mut bound = |m: &mut Self, column: usize, sign: f64, right: f64| {
             m.entry(row, column, sign);
             m.b.push(right);
@@ -185,11 +199,12 @@ impl Programme {
         for k in 0..n {
             bound(self, n + k, 1.0, sub.b_max);
             bound(self, n + k, -1.0, 0.0);
+            bound(self, 2 * n + k, 1.0, sub.kink[k]);
         }
         if let Terminal::Soft { reference, .. } = terminal {
             // s >= 0 and s + E_N >= reference
-            bound(self, 2 * n, -1.0, 0.0);
-            bound(self, 2 * n, -1.0, -reference);
+            bound(self, 3 * n, -1.0, 0.0);
+            bound(self, 3 * n, -1.0, -reference);
             let row = self.b.len() - 1;
             self.entry(row, n - 1, -1.0);
         }
@@ -207,13 +222,16 @@ impl Programme {
         } else {
             None
         };
-        Rows { p_low, p_high, time: time_row }
+        Rows { p_low, p_high, u_low, time: time_row }
     }
 }
 
 /// Clarabel's settings: quiet, single-threaded, and with a fixed pattern.
-fn settings() -> DefaultSettings<f64> {
+fn settings(tolerance: f64) -> DefaultSettings<f64> {
     DefaultSettings {
+        tol_gap_abs: tolerance,
+        tol_gap_rel: tolerance,
+        tol_feas: tolerance,
         verbose: false,
         max_iter: 60,
         presolve_enable: false,
@@ -222,13 +240,25 @@ fn settings() -> DefaultSettings<f64> {
     }
 }
 
-/// Solves the subproblem with Clarabel.
+/// Solves the subproblem with Clarabel at its own tolerance (1e-8).
 #[must_use]
 pub fn solve(
     sub: &Subproblem,
     terminal: Terminal,
     time: TimeRule,
     fence_s: Option<&[f64]>,
+) -> Solution {
+    solve_to(sub, terminal, time, fence_s, 1e-8)
+}
+
+/// Solves the subproblem with Clarabel to a given tolerance of gap and feasibility.
+#[must_use]
+pub fn solve_to(
+    sub: &Subproblem,
+    terminal: Terminal,
+    time: TimeRule,
+    fence_s: Option<&[f64]>,
+    tolerance: f64,
 ) -> Solution {
     let n = sub.n;
     let (m, rows) = Programme::build(sub, terminal, time, fence_s);
@@ -239,7 +269,7 @@ pub fn solve(
         cones.push(ZeroConeT(m.equalities));
     }
     cones.push(NonnegativeConeT(m.b.len() - m.equalities));
-    let Ok(mut solver) = DefaultSolver::new(&p, &m.q, &a, &m.b, &cones, settings()) else {
+    let Ok(mut solver) = DefaultSolver::new(&p, &m.q, &a, &m.b, &cones, settings(tolerance)) else {
         return Solution::default();
     };
     solver.solve();
@@ -262,8 +292,10 @@ pub fn solve(
         status,
         e_j_kg: e,
         b_m_s2: s.x[n..2 * n].to_vec(),
-        traction_price: (0..n).map(|k| s.z[rows.p_high + k] - s.z[rows.p_low + k]).collect(),
-        power_limited: (0..n).map(|k| s.z[rows.p_high + k] > s.s[rows.p_high + k]).collect(),
+        traction_price: (0..n)
+            .map(|k| s.z[rows.p_high + k] - s.z[rows.p_low + k] - s.z[rows.u_low + k])
+            .collect(),
+        cut_price: (0..n).map(|k| s.z[rows.p_low + k]).collect(),
         beta_g_s: match (time, rows.time) {
             (TimeRule::Price(beta), _) => beta,
             (_, Some(row)) => s.z[row],

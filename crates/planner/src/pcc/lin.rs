@@ -8,8 +8,10 @@
 //!   first order in the constraint and with its curvature, weighted by the time price, in the cost
 //! - (d) traction `0 <= p_k <= φ⁰ + φ'(Ē-Ē⁰)`, φ the full-load envelope of the gear
 //! - (e) `E_min <= E <= E_max`, `0 <= b <= b_max`
-//! - (g) cost `q1 p + q2 p²/2 + g_E Ē + w_a ΔE² + w_j Σ(Δa)² + ε b + β t`, in g: q1, q2 from the
-//!   fuel map of the gear at `v⁰`, `g_E` its change with speed at fixed `p`
+//! - (g) cost `q1 p + q2 p²/2 - δ u + g_E Ē + w_a ΔE² + w_j Σ(Δa)² + ε b + β t`, in g: q1, q2 from
+//!   the fuel map of the gear at `v⁰` above zero wheel force, `g_E` its change with speed at fixed
+//!   `p`; `u <= min(p, D)` is the part of the traction that only overcomes the engine's own drag,
+//!   cheaper by `δ` (the driveline's losses change sides at zero wheel force)
 //!
 //! **Safe side.** A tangent of a convex function lies below it: the linearised elapsed time never
 //! exceeds the true one. A fence `t_k >= t_f,k` (the lead's rear, minus the gap, passes `s_k` at
@@ -24,6 +26,7 @@ use tractrix_core::GRAVITY_M_S2;
 
 use super::course::{Course, Tuning};
 use super::drive::duration_s;
+use super::sqp::CutModel;
 use super::truck::{Drive, Truck};
 
 /// What holds at the last node.
@@ -75,6 +78,10 @@ pub struct Subproblem {
     pub q1: Vec<f64>,
     /// Quadratic cost of `p`, g per (m/s²)².
     pub q2: Vec<f64>,
+    /// Traction at zero wheel force, m/s².
+    pub kink: Vec<f64>,
+    /// Discount of traction below the kink, g per m/s²; positive.
+    pub discount: Vec<f64>,
     /// Linear cost of the mean energy, g per J/kg.
     pub ge: Vec<f64>,
     /// Cost of `(E_{k+1}-E_k)²`.
@@ -104,7 +111,9 @@ pub struct Subproblem {
 }
 
 /// Traction that a neutral interval leaves to the solver's interior, m/s².
-const NEUTRAL_TRACTION: f64 = 1e-3;
+const NEUTRAL_TRACTION: f64 = 3e-4;
+/// Smallest discount below the kink relative to the marginal fuel: keeps `u` at its bound.
+const LEAST_DISCOUNT: f64 = 1e-3;
 /// Half width of the speed difference that slopes are taken over, m/s.
 const SLOPE_STEP: f64 = 0.25;
 
@@ -119,6 +128,8 @@ impl Subproblem {
             &mut self.phi1,
             &mut self.q1,
             &mut self.q2,
+            &mut self.kink,
+            &mut self.discount,
             &mut self.ge,
             &mut self.wa,
             &mut self.mean0,
@@ -142,6 +153,7 @@ impl Subproblem {
         e: &[f64],
         gears: &[Drive],
         beta_g_s: f64,
+        cut: CutModel,
     ) {
         let (n, h) = (course.n(), course.h_m);
         self.resize(n);
@@ -165,7 +177,7 @@ impl Subproblem {
             self.r[k] = overrun - overrun_slope * mean
                 + GRAVITY_M_S2 * (course.sin[k] + truck.rolling_coeff * course.cos[k]);
             let p = (self.a0[k] * e[k] + self.a1[k] * e[k + 1] + self.r[k]).max(0.0);
-            self.traction_and_fuel(truck, drive, k, v, p);
+            self.traction_and_fuel(truck, drive, k, v, p, cut);
             q_typical += self.q1[k];
             self.wa[k] = tuning.accel_penalty_g_s3_m2 / (h * v);
             let sum = v0 + v1;
@@ -177,7 +189,15 @@ impl Subproblem {
         self.b_cost = 1e-3 * q_typical / n as f64;
     }
 
-    fn traction_and_fuel(&mut self, truck: &Truck, drive: Drive, k: usize, v: f64, p: f64) {
+    fn traction_and_fuel(
+        &mut self,
+        truck: &Truck,
+        drive: Drive,
+        k: usize,
+        v: f64,
+        p: f64,
+        cut: CutModel,
+    ) {
         let h = self.h_m;
         let per_interval = |v: f64, p: f64| h / v * truck.fuel_charged_g_s(drive, v, p);
         let low = (v - SLOPE_STEP).max(0.5 * v);
@@ -190,6 +210,8 @@ impl Subproblem {
                 self.phi1[k] = 0.0;
                 self.q1[k] = h;
                 self.q2[k] = 0.0;
+                self.kink[k] = NEUTRAL_TRACTION;
+                self.discount[k] = LEAST_DISCOUNT * h;
             }
             Drive::Gear(g) => {
                 let g = g as usize;
@@ -197,12 +219,32 @@ impl Subproblem {
                 let slope = (truck.traction_m_s2(g, high) - truck.traction_m_s2(g, low)) / d_e;
                 self.phi1[k] = slope;
                 self.phi0[k] = phi - slope * self.mean0[k];
-                // Quadratic through the map at 20, 60 and 100 % of full traction; convex part only.
-                let f = [0.2, 0.6, 1.0].map(|u| per_interval(v, u * phi));
-                let bend = (f[2] - 2.0 * f[1] + f[0]) / (0.4 * phi * 0.4 * phi);
+                // Quadratic through the map at zero wheel force, half way and full traction; only
+                // its convex part. Below zero wheel force a straight line to fuel cut-off, where
+                // the true flow is zero: with a map that jumps there, its lower convex hull.
+                let kink = truck.overrun_m_s2(g, v).min(0.9 * phi);
+                let half = 0.5 * (phi - kink);
+                let f = [0.0, 1.0, 2.0].map(|u| per_interval(v, kink + u * half));
+                let bend = (f[2] - 2.0 * f[1] + f[0]) / (half * half);
                 self.q2[k] = bend.max(0.0);
-                self.q1[k] = (f[2] - f[0]) / (0.8 * phi) - self.q2[k] * 0.6 * phi;
+                self.q1[k] = (f[2] - f[0]) / (2.0 * half) - self.q2[k] * (kink + half);
+                let zero = match cut {
+                    CutModel::Hull => 0.0,
+                    CutModel::Charged => per_interval(v, 0.0),
+                };
+                let below = (f[0] - zero) / kink;
+                let above = self.q1[k] + self.q2[k] * kink;
+                self.kink[k] = kink;
+                self.discount[k] = (above - below).max(LEAST_DISCOUNT * above);
             }
+        }
+    }
+
+    /// Leaves marked intervals (empty: none) no traction beyond the solver's interior.
+    pub fn force_cut(&mut self, marked: &[bool]) {
+        for (k, _) in marked.iter().enumerate().filter(|(_, m)| **m) {
+            self.phi0[k] = NEUTRAL_TRACTION;
+            self.phi1[k] = 0.0;
         }
     }
 

@@ -15,6 +15,8 @@
 //! | [`cruise`] | conventional cruise control, the baselines |
 //! | [`lin`], [`quadratic`] | the convex subproblem |
 //! | [`clarabel_backend`] | its solution by Clarabel |
+//! | [`structured`] | its solution by a banded interior-point method, without a library |
+//! | [`solver`] | which of the two a subproblem goes to |
 //! | [`search`] | joint search over speed and gear on a grid |
 //! | [`gears`] | shift places along a profile |
 //! | [`sqp`] | the iteration |
@@ -33,12 +35,14 @@ pub mod lin;
 pub mod quadratic;
 pub mod search;
 pub mod solution;
+pub mod solver;
 pub mod sqp;
+pub mod structured;
 pub mod trip;
 pub mod truck;
 
 pub use course::{SpeedBand, Tuning};
 pub use error::PccError;
-#[cfg(feature = "solver")]
-pub use trip::plan_trip;
-pub use trip::{TripRequest, TripResult, TripRow, TripStatus, TripTotals, plan_trip_with};
+pub use trip::{
+    TripRequest, TripResult, TripRow, TripStatus, TripTotals, plan_trip, plan_trip_with,
+};

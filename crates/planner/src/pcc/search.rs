@@ -152,8 +152,8 @@ pub struct SearchPrices {
     pub accel_penalty_g_s3_m2: f64,
     /// Largest brake force per mass, m/s².
     pub brake_m_s2: f64,
-    /// Largest deceleration that braking adds up to, m/s².
-    pub decel_m_s2: f64,
+    /// Whether fuel cut-off is free, as in truth, or charged the fixed part of the map.
+    pub free_cut: bool,
 }
 
 /// The cheapest path.
@@ -255,9 +255,10 @@ fn expand(
     let road = truck.resistance_m_s2(0.0, grid.sin[k], grid.cos[k]);
     let at0 = ((e0 / TABLE_STEP + 0.5) as usize).min(tables.rows - 1);
     let drag0 = tables.points[g * tables.rows + at0].drag;
-    // Coasting alone may slow down faster than the planned deceleration.
-    let slowest = (road + drag0 + truck.drag_1_m * e0).max(prices.decel_m_s2) / mu;
-    let lowest = e0 - slowest * h - grid.step_e;
+    // Braking pays only where the next node's ceiling lies below coasting.
+    let coast = e0 - h * (road + drag0 + truck.drag_1_m * e0) / mu;
+    let ceiling = grid.energy(k + 1, after.len() - 1);
+    let lowest = coast.min(ceiling) - 1.5 * grid.step_e;
     let first = libm::ceil((lowest - grid.start_e) / grid.step_e) as i32 - grid.low[k + 1];
     for (j, &v1) in after.iter().enumerate().skip(first.max(0) as usize) {
         let e1 = grid.energy(k + 1, j);
@@ -278,7 +279,11 @@ fn expand(
         let u = need.max(0.0) / point.limit * (LEVELS - 1) as f64;
         let l = (u as usize).min(LEVELS - 2);
         let f = &point.fuel_g_m;
-        let fuel = h * (f[l] + (u - l as f64) * (f[l + 1] - f[l]));
+        let fuel = if prices.free_cut && need <= 0.0 {
+            0.0
+        } else {
+            h * (f[l] + (u - l as f64) * (f[l + 1] - f[l]))
+        };
         let seconds = 2.0 * h / (edge.v0 + v1);
         let total = edge.base
             + fuel

@@ -25,10 +25,11 @@ pub struct Solution {
     pub e_j_kg: Vec<f64>,
     /// Brake force per mass per interval, m/s².
     pub b_m_s2: Vec<f64>,
-    /// Multiplier of the traction envelope minus that of fuel cut-off, per interval, g per m/s².
+    /// Multiplier of the traction envelope minus those of fuel cut-off and of the kink, per
+    /// interval, g per m/s²: worth of traction beyond its marginal fuel.
     pub traction_price: Vec<f64>,
-    /// Whether the traction envelope binds, per interval.
-    pub power_limited: Vec<bool>,
+    /// Multiplier of fuel cut-off, per interval, g per m/s².
+    pub cut_price: Vec<f64>,
     /// Price of time, g/s: given, or the multiplier of the trip time.
     pub beta_g_s: f64,
     /// Interior-point iterations.

@@ -1,9 +1,9 @@
 //! Successive linearisation: solve, move, choose gears, again until the profile rests.
 //!
-//! Gears are fixed within a subproblem. They come from a joint search over speed and gear on a
-//! coarse grid at the current price of time; between the first subproblems the places of the shifts
-//! are refined along the profile, among gears that the search uses nearby, and then frozen, because
-//! a gear that flips back and forth would keep the profile from resting.
+//! Gears are frozen during the iteration, because a gear that flips back and forth would keep the
+//! profile from resting. They come from a joint search over speed and gear on a coarse grid at the
+//! current price of time; the places of the shifts are then refined once along the profile, among
+//! gears that the search uses nearby, and kept if the driven plan is better.
 //!
 //! Every subproblem is linearised around a *driven* profile, one that the truth reaches in the
 //! chosen gears, so that it has a feasible point.
@@ -17,9 +17,6 @@ use super::lin::{Subproblem, Terminal, TimeRule};
 use super::search::{EngineTables, SearchGrid, SearchPrices, search};
 use super::solution::{Solution, SolveStatus};
 use super::truck::{Drive, Truck};
-
-/// Passes after which gears are frozen.
-pub const GEAR_PASSES: usize = 4;
 
 /// A planning problem on a course.
 #[derive(Debug, Clone)]
@@ -46,6 +43,19 @@ pub struct Problem<'a> {
     pub eco_roll: bool,
     /// Gear engaged at the start.
     pub start_gear: Option<Drive>,
+    /// How part load between fuel cut-off and zero wheel force is charged.
+    pub cut: CutModel,
+    /// Intervals held at fuel cut-off (empty: none).
+    pub forced_cut: Vec<bool>,
+}
+
+/// How the fuel map is made convex between fuel cut-off and zero wheel force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CutModel {
+    /// Straight from zero at cut-off: the lower convex hull of a map that jumps there.
+    Hull,
+    /// The map's own slope, its fixed part charged at cut-off too.
+    Charged,
 }
 
 /// Iteration limits of the successive linearisation.
@@ -53,15 +63,13 @@ pub struct Problem<'a> {
 pub struct Iterations {
     /// Most subproblems.
     pub most: usize,
-    /// Passes with a gear choice.
-    pub gear_passes: usize,
     /// Largest change of speed at rest, m/s.
     pub rest_m_s: f64,
 }
 
 impl Iterations {
     /// For a whole trip.
-    pub const TRIP: Self = Self { most: 9, gear_passes: GEAR_PASSES, rest_m_s: 0.03 };
+    pub const TRIP: Self = Self { most: 8, rest_m_s: 0.03 };
 }
 
 /// Result of the successive linearisation.
@@ -87,6 +95,25 @@ pub struct Profile {
     pub cut: Vec<bool>,
 }
 
+impl Profile {
+    /// No solution; energies and gears of something that can be driven instead.
+    #[must_use]
+    pub fn failed((e, gears): (&[f64], &[Drive])) -> Self {
+        let n = gears.len();
+        Self {
+            status: SolveStatus::Failed,
+            e_j_kg: e.to_vec(),
+            gears: gears.to_vec(),
+            beta_g_s: 0.0,
+            iterations: 0,
+            subproblems: 0,
+            worth: alloc::vec![0.0; n],
+            limited: alloc::vec![false; n],
+            cut: alloc::vec![false; n],
+        }
+    }
+}
+
 /// A solver of subproblems; the last argument are the fence's earliest times.
 pub type Solver<'s> = dyn FnMut(&Subproblem, Terminal, TimeRule, Option<&[f64]>) -> Solution + 's;
 
@@ -96,13 +123,14 @@ const SEARCH_INTERVAL_M: f64 = 100.0;
 const SEARCH_STEPS: f64 = 14.0;
 
 impl Problem<'_> {
-    /// Gears and a first profile from the coarse joint search at the price `beta_g_s`; the course's
-    /// own cruise control where the grid holds no path.
+    /// Gears and a first profile from the coarse joint search at the price `beta_g_s`; `otherwise`
+    /// where the grid holds no path. `fineness` scales the number of energy steps.
     #[must_use]
     pub fn first_profile(
         &self,
         tables: &EngineTables,
         beta_g_s: f64,
+        fineness: f64,
         otherwise: (&[f64], &[Drive]),
     ) -> (Vec<f64>, Vec<Drive>) {
         let (truck, course) = (self.truck, self.course);
@@ -110,7 +138,7 @@ impl Problem<'_> {
         let merge = (libm::round(SEARCH_INTERVAL_M / course.h_m) as usize).clamp(1, n);
         let v = libm::sqrt(2.0 * self.e_max.iter().sum::<f64>() / (n + 1) as f64);
         let reach = truck.traction_m_s2(truck.strongest_gear(v), v) * course.h_m * merge as f64;
-        let step = (reach / SEARCH_STEPS).clamp(0.5, 4.0);
+        let step = (reach / (SEARCH_STEPS * fineness)).clamp(0.5, 4.0);
         let end = match self.terminal {
             Terminal::Fixed(e) => Some(e),
             Terminal::Soft { .. } => None,
@@ -122,7 +150,7 @@ impl Problem<'_> {
             shift_fuel_g: self.tuning.shift_fuel_g,
             accel_penalty_g_s3_m2: self.tuning.accel_penalty_g_s3_m2,
             brake_m_s2: course.brake_m_s2,
-            decel_m_s2: self.tuning.approach_decel_m_s2,
+            free_cut: true,
         };
         let start = match self.start_gear {
             Some(Drive::Gear(g)) => Some(g),
@@ -161,19 +189,8 @@ pub fn iterate(
     let (truck, course, tuning) = (problem.truck, problem.course, problem.tuning);
     let n = course.n();
     let mut sub = Subproblem::default();
-    let mut now = Profile {
-        status: SolveStatus::Failed,
-        e_j_kg: start.to_vec(),
-        gears: gears.to_vec(),
-        beta_g_s,
-        iterations: 0,
-        subproblems: 0,
-        worth: alloc::vec![0.0; n],
-        limited: alloc::vec![false; n],
-        cut: alloc::vec![false; n],
-    };
-    let allowed = nearby_gears(gears, (libm::round(2.0 * SEARCH_INTERVAL_M / course.h_m)) as usize);
-    for pass in 0..iterations.most {
+    let mut now = Profile { beta_g_s, ..Profile::failed((start, gears)) };
+    for _ in 0..iterations.most {
         let beta = match problem.time {
             TimeRule::Price(beta) => beta,
             TimeRule::AtMost(_) => now.beta_g_s,
@@ -182,15 +199,15 @@ pub fn iterate(
         let targets: Vec<f64> =
             now.e_j_kg.iter().zip(&problem.e_min).map(|(e, low)| e.max(*low)).collect();
         let driven = drive_profile(truck, course, &targets, &now.gears, &[], 0.0).e_j_kg;
-        sub.linearise(truck, course, tuning, &driven, &now.gears, beta);
-        let frozen = pass >= iterations.gear_passes;
-        bounds(problem, &driven, &now.gears, frozen, &mut sub);
+        sub.linearise(truck, course, tuning, &driven, &now.gears, beta, problem.cut);
+        sub.force_cut(&problem.forced_cut);
+        bounds(problem, &driven, &now.gears, &mut sub);
         let mut found = solve(&sub, problem.terminal, problem.time, problem.fence_s.as_deref());
         now.iterations += found.iterations;
         now.subproblems += 1;
         if found.status == SolveStatus::Infeasible && problem.time != TimeRule::Price(beta) {
             // These gears are too slow for the trip time: as fast as a dear second makes it.
-            let dear = TimeRule::Price(2.0 * beta.max(1.0));
+            let dear = TimeRule::Price((2.0 * beta).clamp(1.0, 30.0));
             found = solve(&sub, problem.terminal, dear, problem.fence_s.as_deref());
             now.iterations += found.iterations;
             now.subproblems += 1;
@@ -215,30 +232,31 @@ pub fn iterate(
             let price = found.traction_price[k];
             now.worth[k] = (own + price).max(0.0);
             now.limited[k] = price > 0.02 * own;
-            now.cut[k] = price < -1e-3 * own;
-        }
-        if !frozen && pass > 0 {
-            let chosen = choose_gears(
-                truck,
-                course,
-                &now.e_j_kg,
-                &GearChoice {
-                    shift_fuel_g: tuning.shift_fuel_g,
-                    worth: Some((&now.worth, &now.limited)),
-                    start: problem.start_gear,
-                    allowed: Some(&allowed),
-                },
-            );
-            if chosen != now.gears {
-                now.gears = chosen;
-                continue;
-            }
+            let forced = problem.forced_cut.get(k).copied().unwrap_or(false);
+            now.cut[k] = forced || found.cut_price[k] > 1e-3 * own;
         }
         if step < iterations.rest_m_s {
             break;
         }
     }
     now
+}
+
+/// Gears chosen anew along a profile, among those used nearby, at the profile's worth of traction.
+#[must_use]
+pub fn refined_gears(problem: &Problem<'_>, profile: &Profile) -> Vec<Drive> {
+    let reach = libm::round(2.0 * SEARCH_INTERVAL_M / problem.course.h_m) as usize;
+    choose_gears(
+        problem.truck,
+        problem.course,
+        &profile.e_j_kg,
+        &GearChoice {
+            shift_fuel_g: problem.tuning.shift_fuel_g,
+            worth: Some((&profile.worth, &profile.limited)),
+            start: problem.start_gear,
+            allowed: Some(&nearby_gears(&profile.gears, reach)),
+        },
+    )
 }
 
 /// Bit set of gears used within `reach` intervals, per interval.
@@ -254,19 +272,10 @@ fn nearby_gears(gears: &[Drive], reach: usize) -> Vec<u32> {
 
 /// Energy bounds of a subproblem: the problem's, widened to the driven profile so that there is a
 /// feasible point, and once gears are frozen the speed ranges of the gears.
-fn bounds(
-    problem: &Problem<'_>,
-    driven: &[f64],
-    gears: &[Drive],
-    frozen: bool,
-    sub: &mut Subproblem,
-) {
+fn bounds(problem: &Problem<'_>, driven: &[f64], gears: &[Drive], sub: &mut Subproblem) {
     sub.e_max.copy_from_slice(&problem.e_max);
     for (low, (&bound, &e)) in sub.e_min.iter_mut().zip(problem.e_min.iter().zip(driven)) {
         *low = bound.min(e * (1.0 - 1e-5));
-    }
-    if !frozen {
-        return;
     }
     for (k, &drive) in gears.iter().enumerate() {
         let Drive::Gear(g) = drive else { continue };

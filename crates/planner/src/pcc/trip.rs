@@ -13,7 +13,8 @@ use super::gears::{GearChoice, choose_gears};
 use super::lin::{Terminal, TimeRule};
 use super::search::EngineTables;
 use super::solution::SolveStatus;
-use super::sqp::{Iterations, Problem, Profile, Solver, iterate};
+use super::solver::DefaultSolver;
+use super::sqp::{CutModel, Iterations, Problem, Profile, Solver, iterate, refined_gears};
 use super::truck::{Drive, Truck};
 
 /// A trip to plan.
@@ -134,6 +135,9 @@ pub struct TripResult {
     pub e_max_j_kg: Vec<f64>,
 }
 
+/// Energy steps of the gear searches, relative: two grids, so that neither's rounding decides.
+const SEARCH_FINENESS: [f64; 2] = [1.0, 1.3];
+
 /// Overspeed of the second baseline, m/s.
 const OVERSPEED_M_S: f64 = 5.0 / 3.6;
 
@@ -227,6 +231,8 @@ impl Trip {
             fence_s: None,
             eco_roll: self.eco_roll,
             start_gear: None,
+            cut: CutModel::Hull,
+            forced_cut: Vec::new(),
         }
     }
 
@@ -250,40 +256,103 @@ impl Trip {
         end_e: f64,
         solver: &mut Solver<'_>,
     ) -> (Driven, Profile) {
-        let problem = self.problem(trip_time_s, end_e);
+        let mut problem = self.problem(trip_time_s, end_e);
         let tables = EngineTables::new(&self.truck, self.e_max.iter().copied().fold(0.0, f64::max));
         let cruise = (self.cruise.e_j_kg.as_slice(), self.cruise.drive.as_slice());
         let mut beta = self.beta_guess();
-        let (mut e, mut gears) = problem.first_profile(&tables, beta, cruise);
-        for _ in 0..2 {
-            // One subproblem tells the price of time, which the gear search is asked again with.
-            let probe = Iterations { most: 1, ..Iterations::TRIP };
-            let first = iterate(&problem, &e, &gears, beta, probe, solver);
-            if (first.beta_g_s - beta).abs() < 0.1 * beta {
-                break;
+        let mut best: Option<(f64, Driven, Profile)> = None;
+        for fineness in SEARCH_FINENESS {
+            let (mut e, mut gears) = problem.first_profile(&tables, beta, fineness, cruise);
+            for _ in 0..2 {
+                // One subproblem tells the price of time, which the gear search is asked again with.
+                let probe = Iterations { most: 1, ..Iterations::TRIP };
+                let first = iterate(&problem, &e, &gears, beta, probe, solver);
+                let settled = (first.beta_g_s - beta).abs() < 0.1 * beta;
+                beta = first.beta_g_s;
+                if settled {
+                    break;
+                }
+                (e, gears) = problem.first_profile(&tables, beta, fineness, cruise);
             }
-            beta = first.beta_g_s;
-            (e, gears) = problem.first_profile(&tables, beta, cruise);
+            let profile = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
+            beta = profile.beta_g_s;
+            let refined = refined_gears(&problem, &profile);
+            let e = profile.e_j_kg.clone();
+            let other = (refined != profile.gears)
+                .then(|| iterate(&problem, &e, &refined, beta, Iterations::TRIP, solver));
+            self.keep_better(&problem, trip_time_s, profile, &mut best);
+            if let Some(other) = other {
+                self.keep_better(&problem, trip_time_s, other, &mut best);
+            }
         }
-        let profile = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
+        // Part load below zero wheel force: either charged as it is, or cut where it is least.
+        problem.cut = CutModel::Charged;
+        for _ in 0..2 {
+            let Some((_, driven, kept)) = &best else { break };
+            if matches!(problem.cut, CutModel::Hull) {
+                problem.forced_cut = self.light_load(driven);
+            }
+            let (e, gears, beta) = (kept.e_j_kg.clone(), kept.gears.clone(), kept.beta_g_s);
+            let other = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
+            self.keep_better(&problem, trip_time_s, other, &mut best);
+            problem.cut = CutModel::Hull;
+        }
+        let Some((_, driven, profile)) = best else {
+            return (self.cruise.clone(), Profile::failed(cruise));
+        };
+        // Cruise control is a plan too: where nothing can be gained (a flat road) it is driven.
+        let mut driven = driven;
+        for other in [&self.cruise, &self.overspeed] {
+            if other.trip_time_s() <= trip_time_s * (1.0 + 1e-9)
+                && other.e_j_kg[other.e_j_kg.len() - 1] >= end_e - 1e-9
+                && other.total_fuel_g() <= driven.total_fuel_g() * (1.0 + 1e-6)
+                && self.violation(other) < 1e-6
+            {
+                driven = other.clone();
+            }
+        }
+        (driven, profile)
+    }
+
+    /// Intervals that inject less than half of what the engine's own drag takes.
+    fn light_load(&self, driven: &Driven) -> Vec<bool> {
+        (0..self.course.n())
+            .map(|k| match driven.drive[k] {
+                Drive::Gear(g) => {
+                    let v = libm::sqrt(driven.e_j_kg[k] + driven.e_j_kg[k + 1]);
+                    driven.p_m_s2[k] < 0.5 * self.truck.overrun_m_s2(g as usize, v)
+                }
+                Drive::Neutral => false,
+            })
+            .collect()
+    }
+
+    /// Drives a profile and keeps it if it costs less than the best so far: fuel, and the price of
+    /// time for what it is late, tenfold so that a late plan wins only where none is in time.
+    fn keep_better(
+        &self,
+        problem: &Problem<'_>,
+        trip_time_s: f64,
+        profile: Profile,
+        best: &mut Option<(f64, Driven, Profile)>,
+    ) {
+        if !matches!(profile.status, SolveStatus::Solved | SolveStatus::AlmostSolved) {
+            return;
+        }
         let driven = drive_profile(
-            &self.truck,
-            &self.course,
+            problem.truck,
+            problem.course,
             &profile.e_j_kg,
             &profile.gears,
             &profile.cut,
-            self.tuning.shift_fuel_g,
+            problem.tuning.shift_fuel_g,
         );
-        // Cruise control is a plan too: where nothing can be gained (a flat road) it is driven.
-        let cruise = &self.cruise;
-        let last = cruise.e_j_kg.len() - 1;
-        if cruise.trip_time_s() <= trip_time_s * (1.0 + 1e-9)
-            && cruise.e_j_kg[last] >= end_e - 1e-9
-            && cruise.total_fuel_g() <= driven.total_fuel_g() * (1.0 + 1e-6)
-        {
-            return (cruise.clone(), profile);
+        let price = profile.beta_g_s.max(self.beta_guess());
+        let late = (driven.trip_time_s() - trip_time_s * (1.0 + 1e-5)).max(0.0);
+        let cost = driven.total_fuel_g() + 10.0 * price * late;
+        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+            *best = Some((cost, driven, profile));
         }
-        (driven, profile)
     }
 
     /// Totals of a driven trip.
@@ -353,13 +422,13 @@ pub fn plan_trip_with(
     })
 }
 
-/// [`plan_trip_with`] Clarabel.
+/// [`plan_trip_with`] the [`DefaultSolver`].
 ///
 /// # Errors
 /// As [`plan_trip_with`].
-#[cfg(feature = "solver")]
 pub fn plan_trip(request: &TripRequest<'_>) -> Result<TripResult, PccError> {
-    plan_trip_with(request, &mut super::clarabel_backend::solve)
+    let mut solver = DefaultSolver::default();
+    plan_trip_with(request, &mut |sub, end, time, fence| solver.solve(sub, end, time, fence))
 }
 
 impl Trip {
@@ -367,14 +436,14 @@ impl Trip {
         self.e_max[self.course.n()]
     }
 
-    /// Largest violation of the speed bounds (m/s), full load or planned brakes (m/s²).
+    /// Largest violation of the speed ceiling (m/s), full load or planned brakes (m/s²). The
+    /// minimum speed is a wish, relaxed where the truck cannot hold it.
     #[must_use]
     pub fn violation(&self, d: &Driven) -> f64 {
         let mut worst = 0.0f64;
         for k in 0..self.course.n() {
             let v = |e: f64| libm::sqrt(2.0 * e);
-            let (low, high) = (self.e_min[k + 1], self.e_max[k + 1]);
-            worst = worst.max(d.v_m_s(k + 1) - v(high));
+            worst = worst.max(d.v_m_s(k + 1) - v(self.e_max[k + 1]));
             let mean = v(0.5 * (d.e_j_kg[k] + d.e_j_kg[k + 1]));
             let top = match d.drive[k] {
                 Drive::Gear(g) => self.truck.traction_m_s2(g as usize, mean),
@@ -382,10 +451,6 @@ impl Trip {
             };
             worst = worst.max(d.p_m_s2[k] - top);
             worst = worst.max(d.brake_m_s2[k] - self.course.brake_m_s2);
-            // Below the minimum speed only full power excuses.
-            if d.p_m_s2[k] < top - 1e-3 {
-                worst = worst.max((v(low) - d.v_m_s(k + 1)).min(top - d.p_m_s2[k]));
-            }
         }
         worst
     }

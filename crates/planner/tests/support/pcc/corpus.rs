@@ -4,7 +4,7 @@ use planner::pcc::course::profile_of;
 use road::ProfilePoint;
 
 /// Length of the synthetic roads, m.
-pub const LENGTH_M: f64 = 15_000.0;
+pub(crate) const LENGTH_M: f64 = 15_000.0;
 
 fn by_grade(grade_frac: impl Fn(f64) -> f64) -> Vec<ProfilePoint> {
     (0..=(LENGTH_M / 12.5) as usize)
@@ -64,7 +64,7 @@ fn hills(grade: impl Fn(usize) -> f64, period_m: f64) -> Vec<ProfilePoint> {
 }
 
 /// Name and profile of every road.
-pub fn roads() -> Vec<(&'static str, Vec<ProfilePoint>)> {
+pub(crate) fn roads() -> Vec<(&'static str, Vec<ProfilePoint>)> {
     let tau = 2.0 * core::f64::consts::PI;
     vec![
         ("flat", by_grade(|_| 0.0)),

@@ -12,28 +12,28 @@ use planner::pcc::trip::Trip;
 use planner::pcc::truck::Drive;
 
 /// A driven path.
-pub struct Reference {
+pub(crate) struct Reference {
     /// The trip.
-    pub driven: Driven,
+    pub(crate) driven: Driven,
     /// Price of time, g/s.
-    pub beta_g_s: f64,
+    pub(crate) beta_g_s: f64,
 }
 
 /// Grid sizes of a reference.
 #[derive(Clone, Copy)]
-pub struct Fineness {
+pub(crate) struct Fineness {
     /// Energy steps that full traction covers per interval, whole band at 100 m.
-    pub coarse: f64,
+    pub(crate) coarse: f64,
     /// Same in the tube at the course's step.
-    pub fine: f64,
+    pub(crate) fine: f64,
     /// Half width of the tube in steps.
-    pub half: f64,
+    pub(crate) half: f64,
 }
 
 /// For the tests that always run.
-pub const QUICK: Fineness = Fineness { coarse: 16.0, fine: 20.0, half: 24.0 };
+pub(crate) const QUICK: Fineness = Fineness { coarse: 16.0, fine: 20.0, half: 24.0 };
 /// For the campaign.
-pub const FINE: Fineness = Fineness { coarse: 24.0, fine: 24.0, half: 40.0 };
+pub(crate) const FINE: Fineness = Fineness { coarse: 24.0, fine: 24.0, half: 40.0 };
 
 fn timed(
     trip: &Trip,
@@ -52,7 +52,7 @@ fn timed(
             shift_fuel_g: trip.tuning.shift_fuel_g,
             accel_penalty_g_s3_m2: trip.tuning.accel_penalty_g_s3_m2,
             brake_m_s2: trip.course.brake_m_s2,
-            decel_m_s2: trip.tuning.approach_decel_m_s2,
+            free_cut: true,
         };
         let path = search(&trip.truck, tables, grid, &prices, None)?;
         if path.time_s <= goal_s {
@@ -78,7 +78,7 @@ fn timed(
 }
 
 /// The reference of a trip in `goal_s` to the end energy `end_e`; `None` if no path is fast enough.
-pub fn reference(trip: &Trip, goal_s: f64, end_e: f64, f: Fineness) -> Option<Reference> {
+pub(crate) fn reference(trip: &Trip, goal_s: f64, end_e: f64, f: Fineness) -> Option<Reference> {
     let n = trip.course.n();
     let top = trip.e_max.iter().copied().fold(0.0, f64::max);
     let tables = EngineTables::new(&trip.truck, top + 5.0);

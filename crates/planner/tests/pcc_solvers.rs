@@ -1,0 +1,70 @@
+//! The structured solver against Clarabel on identical subproblems.
+
+#[allow(dead_code)]
+#[path = "support/pcc/corpus.rs"]
+mod corpus;
+#[path = "support/data_sheet.rs"]
+mod data_sheet;
+
+use planner::pcc::clarabel_backend;
+use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
+use planner::pcc::solution::{Solution, SolveStatus};
+use planner::pcc::structured::Structured;
+use planner::pcc::trip::{Trip, TripRequest};
+use planner::pcc::{SpeedBand, Tuning};
+
+#[test]
+fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
+    let mut compared = 0;
+    let mut fast = Structured::default();
+    for (name, profile) in corpus::roads() {
+        for mass in [19_000.0, 55_000.0] {
+            let mut limits = data_sheet::reference_limits();
+            limits.road_load.mass_kg = mass;
+            let request = TripRequest {
+                profile: &profile,
+                truck: &limits,
+                band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
+                trip_time_s: None,
+                eco_roll: false,
+                tuning: Tuning::default(),
+            };
+            let trip = Trip::new(&request).unwrap();
+            let (mut worst, mut seen) = (0.0f64, 0);
+            let mut judge = |sub: &Subproblem, end: Terminal, time: TimeRule, _: Option<&[f64]>| {
+                seen += 1;
+                let oracle = clarabel_backend::solve(sub, end, time, None);
+                if seen > 3 {
+                    return oracle;
+                }
+                let price = TimeRule::Price(oracle.beta_g_s);
+                let reference = sub.e_max[sub.n].min(190.0);
+                let soft = Terminal::Soft { reference, pay: 3.0, credit: 2.0 };
+                for (end, time) in [(end, time), (end, price), (soft, price)] {
+                    let oracle = clarabel_backend::solve_to(sub, end, time, None, 1e-10);
+                    let mut own = Solution::default();
+                    fast.solve_into(sub, end, time, &mut own);
+                    if oracle.status == SolveStatus::Solved {
+                        assert_eq!(
+                            own.status,
+                            SolveStatus::Solved,
+                            "{name} {mass} {time:?} {end:?}"
+                        );
+                        let gap = own.e_j_kg.iter().zip(&oracle.e_j_kg);
+                        let gap = gap.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
+                        worst = worst.max(gap);
+                        if gap > 1e-4 {
+                            println!("{name} {mass} {time:?} {end:?} {gap:e}");
+                        }
+                        compared += 1;
+                    }
+                }
+                oracle
+            };
+            trip.solve(trip.cruise.trip_time_s(), *trip.cruise.e_j_kg.last().unwrap(), &mut judge);
+            println!("{name} {mass}: {worst:e}");
+            assert!(worst < 1e-4, "{name} {mass}: {worst:e}");
+        }
+    }
+    assert!(compared > 100, "{compared}");
+}
