@@ -13,6 +13,31 @@ use planner::pcc::structured::Structured;
 use planner::pcc::trip::{Trip, TripRequest};
 use planner::pcc::{SpeedBand, Tuning};
 
+/// The subproblem's objective at a solution, g.
+fn cost(sub: &Subproblem, end: Terminal, time: TimeRule, x: &Solution) -> f64 {
+    let e = &x.e_j_kg;
+    let mut sum = 0.0;
+    for k in 0..sub.n {
+        let p = sub.p(k, e, x.b_m_s2[k]);
+        let mean = 0.5 * (e[k] + e[k + 1]);
+        sum += sub.q1[k] * p + 0.5 * sub.q2[k] * p * p - sub.discount[k] * p.min(sub.kink[k]);
+        sum += sub.ge[k] * mean + sub.wa[k] * (e[k + 1] - e[k]).powi(2);
+        sum += 0.5 * sub.hessian_price * sub.t2[k] * (mean - sub.mean0[k]).powi(2);
+        sum += sub.b_cost * x.b_m_s2[k];
+        if k + 2 <= sub.n {
+            sum += sub.wj * (e[k + 2] - 2.0 * e[k + 1] + e[k]).powi(2);
+        }
+    }
+    if let TimeRule::Price(beta) = time {
+        sum += beta * sub.time_s(e);
+    }
+    if let Terminal::Soft { reference, pay, credit } = end {
+        let spare = e[sub.n] - reference;
+        sum += if spare < 0.0 { -pay * spare } else { -credit * spare };
+    }
+    sum
+}
+
 #[test]
 fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
     let mut compared = 0;
@@ -50,11 +75,18 @@ fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
                             SolveStatus::Solved,
                             "{name} {mass} {time:?} {end:?}"
                         );
-                        let gap = own.e_j_kg.iter().zip(&oracle.e_j_kg);
-                        let gap = gap.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
-                        worst = worst.max(gap);
-                        if gap > 1e-4 {
-                            println!("{name} {mass} {time:?} {end:?} {gap:e}");
+                        if let Terminal::Soft { .. } = end {
+                            // The best end energy is nearly indifferent: costs are compared.
+                            let (ours, theirs) =
+                                (cost(sub, end, time, &own), cost(sub, end, time, &oracle));
+                            assert!(
+                                ours <= theirs + 1e-6 * theirs.abs(),
+                                "{name} {mass}: {ours} g, Clarabel {theirs} g"
+                            );
+                        } else {
+                            let gap = own.e_j_kg.iter().zip(&oracle.e_j_kg);
+                            let gap = gap.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
+                            worst = worst.max(gap);
                         }
                         compared += 1;
                     }
@@ -62,7 +94,6 @@ fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
                 oracle
             };
             trip.solve(trip.cruise.trip_time_s(), *trip.cruise.e_j_kg.last().unwrap(), &mut judge);
-            println!("{name} {mass}: {worst:e}");
             assert!(worst < 1e-4, "{name} {mass}: {worst:e}");
         }
     }

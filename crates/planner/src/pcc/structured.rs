@@ -30,7 +30,7 @@ use super::solution::{Solution, SolveStatus};
 const ROWS: usize = 8;
 const MAX_ITERATIONS: u32 = 60;
 /// Complementarity at which the solve ends, g per inequality.
-const MU_END: f64 = 2e-9;
+const MU_END: f64 = 2e-10;
 /// Largest violation of an inequality in its own unit (J/kg, m/s², s).
 const PRIMAL_END: f64 = 1e-6;
 /// Largest gradient left, relative to the largest cost gradient.
@@ -171,7 +171,7 @@ impl Structured {
             let reach = self.reach(fixed).min(1.0);
             let ahead = self.complementarity_after(reach, fixed);
             let ratio = ahead / mu;
-            let target = (ratio * ratio * ratio * mu).max(1e-2 * MU_END);
+            let target = (ratio * ratio * ratio * mu).max(0.1 * MU_END);
             // Corrector: centring and the second-order term.
             self.set_complementarity(|s, z, ds, dz| s * z + ds * dz - target);
             self.direction(sub, fixed);
@@ -184,7 +184,7 @@ impl Structured {
         if status == SolveStatus::Failed {
             let (primal, dual) = self.residuals(sub, terminal, time);
             let mu = self.complementarity(fixed);
-            if mu < 1e4 * MU_END && primal < 1e-5 && dual < 1e-5 * scale {
+            if mu < 1e5 * MU_END && primal < 1e-5 && dual < 1e-5 * scale {
                 status = SolveStatus::AlmostSolved;
             } else if primal > 1e-3 {
                 status = SolveStatus::Infeasible;
