@@ -1,6 +1,6 @@
 //! World ticks per second, with and without traffic.
-#![expect(missing_docs, reason = "criterion's macros")]
-#![expect(clippy::unwrap_used, reason = "a bench may stop")]
+#![allow(missing_docs, reason = "criterion's macros")]
+#![allow(clippy::unwrap_used, reason = "a bench may stop")]
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use sim::{Scenario, World};
