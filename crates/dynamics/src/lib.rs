@@ -6,6 +6,7 @@
 //! rpm where the field does.
 
 mod bounds;
+pub mod catalogue;
 pub mod effects;
 mod error;
 pub mod lateral;
@@ -14,10 +15,9 @@ mod output;
 mod parameters;
 mod state;
 
+pub use effects::instruments::InstrumentParameters;
 pub use error::DynamicsError;
 pub use model::TruckModel;
 pub use output::PaperOutputs;
-pub use parameters::{
-    BodyParameters, InstrumentParameters, Overlay, OverlayValue, TruckParameters,
-};
+pub use parameters::{BodyParameters, Overlay, OverlayValue, TruckParameters};
 pub use state::{DelayLine, Forces, MAX_DELAY_S, RoadPatch, SUBSTEP_S, TruckState};

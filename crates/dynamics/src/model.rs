@@ -43,7 +43,7 @@ pub struct TruckModel {
 }
 
 impl TruckModel {
-    /// A truck with a payload.
+    /// A truck whose load sheet says a payload.
     ///
     /// # Errors
     /// [`DynamicsError::OutOfBounds`] if the payload or a parameter cannot be used.
@@ -52,7 +52,10 @@ impl TruckModel {
             name: name.to_owned(),
             violations: vec![why],
         };
-        parameters.lateral.payload.mass_kg = payload_kg;
+        parameters.lateral.payload.mass_kg = 0.0;
+        let empty_kg = parameters.lateral.total_mass_kg();
+        parameters.lateral.payload.mass_kg =
+            parameters.instruments.true_payload_kg(empty_kg, payload_kg);
         let name = parameters.name.clone();
         let lateral =
             LateralModel::new(&parameters.lateral).map_err(|e| refuse(&name, e.to_string()))?;
@@ -164,6 +167,7 @@ impl TruckModel {
             _ => DynamicsError::NonFinite { effect: "command", quantity: "?", value: f64::NAN },
         })?;
         let mut s = *state;
+        let patch = &self.true_patch(patch);
         for _ in 0..libm::round(duration_s / SUBSTEP_S).max(0.0) as u32 {
             self.substep(&mut s, command, patch);
         }
@@ -419,9 +423,9 @@ impl TruckModel {
         let air = AirFlow::over(
             v,
             s.lateral.yaw_rad,
-            patch.wind_m_s,
+            (patch.wind_m_s.0 + r.wind_to_x_m_s, patch.wind_m_s.1 + r.wind_to_y_m_s),
             air_density_kg_m3(patch.air_pressure_pa, patch.air_temperature_k),
-            r.headwind_m_s,
+            (r.headwind_m_s, r.crosswind_to_left_m_s),
         );
         let grip = patch.adhesion_coeff;
         let mut axle_n = [0.0; AXLES];
@@ -505,9 +509,16 @@ impl TruckModel {
         s.coolant_k += (level.max(350.0) - s.coolant_k) * SUBSTEP_S / COOLANT.0;
     }
 
+    /// The road under the truck where the map says `patch`.
+    #[must_use]
+    pub fn true_patch(&self, patch: &RoadPatch) -> RoadPatch {
+        self.parameters.instruments.true_patch(patch)
+    }
+
     /// What the lateral model tells about a state.
     #[must_use]
     pub fn lateral_outputs(&self, s: &TruckState, patch: &RoadPatch) -> LateralOutputs {
+        let patch = self.true_patch(patch);
         self.lateral.outputs(
             &s.lateral,
             &LateralInputs {

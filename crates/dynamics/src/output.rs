@@ -87,6 +87,17 @@ impl TruckModel {
         }
     }
 
+    /// What the truck's instruments make of its true state.
+    #[must_use]
+    pub fn measured(&self, truth: &EgoState) -> EgoState {
+        let i = &self.parameters.instruments;
+        EgoState {
+            speed_m_s: truth.speed_m_s * i.speed_scale_coeff,
+            yaw_rate_rad_s: truth.yaw_rate_rad_s + i.yaw_rate_bias_rad_s,
+            ..*truth
+        }
+    }
+
     /// The paper's outputs.
     #[must_use]
     pub fn paper_outputs(&self, s: &TruckState, patch: &RoadPatch) -> PaperOutputs {

@@ -14,6 +14,7 @@ use crate::bounds::Bounds;
 use crate::effects::brake::BrakeParameters;
 use crate::effects::driveline::DrivelineParameters;
 use crate::effects::engine::EngineParameters;
+use crate::effects::instruments::InstrumentParameters;
 use crate::effects::resistance::ResistanceParameters;
 use crate::effects::shift::ShiftParameters;
 use crate::lateral::LateralParameters;
@@ -67,31 +68,6 @@ pub struct BodyParameters {
     pub trailer_rear_m: f64,
     /// Width, m.
     pub width_m: f64,
-}
-
-/// What the instruments do to the signals; neutral by default.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct InstrumentParameters {
-    /// Wheel-based speed over true speed.
-    pub speed_scale_coeff: f64,
-    /// Bias of the yaw rate sensor, rad/s.
-    pub yaw_rate_bias_rad_s: f64,
-    /// Bias of the map's grade, rise over run.
-    pub grade_bias_frac: f64,
-    /// How far the map lies ahead of the truth, m.
-    pub map_shift_m: f64,
-}
-
-impl Default for InstrumentParameters {
-    fn default() -> Self {
-        Self {
-            speed_scale_coeff: 1.0,
-            yaw_rate_bias_rad_s: 0.0,
-            grade_bias_frac: 0.0,
-            map_shift_m: 0.0,
-        }
-    }
 }
 
 /// An overlay on a truck file.
@@ -234,12 +210,7 @@ impl TruckParameters {
         b.within("trailer_rear_m", self.body.trailer_rear_m, 1.0, 25.0);
         b.within("width_m", self.body.width_m, 1.5, 4.0);
         violations.extend(b.violations);
-        let mut b = Bounds::of("instruments");
-        b.within("speed_scale_coeff", self.instruments.speed_scale_coeff, 0.5, 2.0);
-        b.within("yaw_rate_bias_rad_s", self.instruments.yaw_rate_bias_rad_s, -0.2, 0.2);
-        b.within("grade_bias_frac", self.instruments.grade_bias_frac, -0.1, 0.1);
-        b.within("map_shift_m", self.instruments.map_shift_m, -500.0, 500.0);
-        violations.extend(b.violations);
+        violations.extend(self.instruments.violations());
         violations.extend(self.engine.violations());
         violations.extend(self.driveline.violations());
         violations.extend(self.shift.violations(self.driveline.gear_ratios.len()));

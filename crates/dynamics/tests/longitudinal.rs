@@ -1,4 +1,5 @@
 //! Longitudinal dynamics against closed forms.
+#![allow(clippy::unwrap_used, reason = "a test helper fails by panicking")]
 
 use dynamics::{RoadPatch, TruckModel, TruckParameters, TruckState};
 use tractrix_core::{BrakeMode, Command, GRAVITY_M_S2, GearRequest};

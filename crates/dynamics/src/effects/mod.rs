@@ -3,5 +3,6 @@
 pub mod brake;
 pub mod driveline;
 pub mod engine;
+pub mod instruments;
 pub mod resistance;
 pub mod shift;

@@ -45,6 +45,15 @@ pub struct ResistanceParameters {
     /// Head wind that blows against the truck wherever it goes, m/s (a fault of the map of wind).
     #[serde(default)]
     pub headwind_m_s: f64,
+    /// Wind across the truck wherever it goes, m/s, positive blows to the left.
+    #[serde(default)]
+    pub crosswind_to_left_m_s: f64,
+    /// Earth-fixed wind on top of the weather's, blowing towards map x, m/s.
+    #[serde(default)]
+    pub wind_to_x_m_s: f64,
+    /// Earth-fixed wind on top of the weather's, blowing towards map y, m/s.
+    #[serde(default)]
+    pub wind_to_y_m_s: f64,
 }
 
 fn warmup_s() -> f64 {
@@ -63,14 +72,15 @@ pub struct AirFlow {
 }
 
 impl AirFlow {
-    /// Flow of a wind (map frame, blowing towards) over a truck that drives along `yaw_rad`.
+    /// Flow of a wind (map frame, blowing towards) over a truck that drives along `yaw_rad`, plus
+    /// a wind that turns with the truck: against it and to its left.
     #[must_use]
     pub fn over(
         speed_m_s: f64,
         yaw_rad: f64,
         wind_m_s: (f64, f64),
         density_kg_m3: f64,
-        headwind_m_s: f64,
+        (headwind_m_s, crosswind_m_s): (f64, f64),
     ) -> Self {
         let (along, across) = if wind_m_s == (0.0, 0.0) {
             (0.0, 0.0)
@@ -78,7 +88,11 @@ impl AirFlow {
             let (sin, cos) = libm::sincos(yaw_rad);
             (wind_m_s.0 * cos + wind_m_s.1 * sin, wind_m_s.1 * cos - wind_m_s.0 * sin)
         };
-        Self { head_m_s: speed_m_s - along + headwind_m_s, cross_m_s: across, density_kg_m3 }
+        Self {
+            head_m_s: speed_m_s - along + headwind_m_s,
+            cross_m_s: across + crosswind_m_s,
+            density_kg_m3,
+        }
     }
 
     fn yaw_rad(&self) -> f64 {
@@ -109,6 +123,9 @@ impl ResistanceParameters {
         b.within("side_force_area_m2_rad", self.side_force_area_m2_rad, 0.0, 500.0);
         b.within("side_force_tractor_frac", self.side_force_tractor_frac, 0.0, 1.0);
         b.within("headwind_m_s", self.headwind_m_s, -30.0, 30.0);
+        b.within("crosswind_to_left_m_s", self.crosswind_to_left_m_s, -30.0, 30.0);
+        b.within("wind_to_x_m_s", self.wind_to_x_m_s, -30.0, 30.0);
+        b.within("wind_to_y_m_s", self.wind_to_y_m_s, -30.0, 30.0);
         b.violations
     }
 
