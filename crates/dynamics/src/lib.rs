@@ -7,6 +7,7 @@
 
 mod bounds;
 pub mod catalogue;
+mod ecu;
 pub mod effects;
 mod error;
 pub mod lateral;
@@ -15,6 +16,7 @@ mod output;
 mod parameters;
 mod state;
 
+pub use ecu::EcuState;
 pub use effects::instruments::InstrumentParameters;
 pub use error::DynamicsError;
 pub use model::TruckModel;
