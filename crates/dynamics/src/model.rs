@@ -233,19 +233,14 @@ impl TruckModel {
                 }
             }
             ShiftPhase::RampDown if state.phase_s >= p.phase_length_s(ShiftPhase::RampDown) => {
-                // a schedule by road speed is asked again: the truck went on while the torque fell
-                let again = p.wanted_gear(state, &view);
-                let same_way =
-                    again != state.gear && (again > state.gear) == (state.target > state.gear);
-                if p.speed_map.is_some() && same_way {
-                    state.target = again;
-                }
+                p.retarget(state, &view);
                 state.phase = ShiftPhase::Open;
                 state.phase_s = 0.0;
                 s.clutch_locked = false;
                 s.clutch_frac = 0.0;
             }
             ShiftPhase::Open if state.phase_s >= p.phase_length_s(ShiftPhase::Open) => {
+                p.retarget(state, &view);
                 state.gear = state.target;
                 state.phase = ShiftPhase::RampUp;
                 state.phase_s = 0.0;

@@ -185,6 +185,16 @@ impl ShiftParameters {
         }
     }
 
+    /// Asks a schedule by road speed again during a shift: the truck went on while the torque was
+    /// away, and a further gear in the same direction may be due.
+    pub(crate) fn retarget(&self, state: &mut ShiftState, view: &TcuView<'_>) {
+        let Some(map) = &self.speed_map else { return };
+        let again = map.wanted_gear(&ShiftState { gear: state.target, ..*state }, view);
+        if again != state.target && (again > state.target) == (state.target > state.gear) {
+            state.target = again;
+        }
+    }
+
     /// Whether the schedule sees a reason to shift down (before any hold time).
     fn by_engine_speed(&self, state: &ShiftState, view: &TcuView<'_>) -> u8 {
         let gear = state.gear;
@@ -234,11 +244,7 @@ impl SpeedMap {
             if skip && state.gear <= self.skip_to_gear {
                 return (now + 2).min(top) as u8;
             }
-            let mut gear = now + 1;
-            while !skip && gear < top && exceeded(gear) {
-                gear += 1;
-            }
-            return gear as u8;
+            return (now + 1) as u8;
         }
         if now > 1 && view.speed_m_s < self.down_speed_m_s[now - 2] {
             return (now - 1) as u8;
