@@ -1,4 +1,5 @@
-//! Time of a whole-trip plan. `cargo bench -p planner --bench pcc`
+//! Time of whole-trip plans and of 4 km replans, with the structured solver and with Clarabel.
+//! `cargo bench -p planner --bench pcc`
 #![allow(missing_docs, clippy::unwrap_used)]
 
 #[allow(dead_code)]
@@ -6,18 +7,23 @@
 mod corpus;
 #[path = "../tests/support/data_sheet.rs"]
 mod data_sheet;
+#[path = "../tests/support/pcc/replan.rs"]
+mod replan;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use planner::pcc::lin::Subproblem;
+use planner::pcc::solution::Solution;
 use planner::pcc::solver::DefaultSolver;
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::{SpeedBand, Tuning};
+use planner::pcc::structured::Structured;
+use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
+use planner::pcc::{SpeedBand, Tuning, clarabel_backend};
 use std::hint::black_box;
 
-fn trips(c: &mut Criterion) {
-    let mut group = c.benchmark_group("trip_15_km");
-    group.sample_size(10);
+const ROADS: [&str; 3] = ["rolling2", "hilly5", "test_site"];
+
+fn each_trip(mut run: impl FnMut(&str, &TripRequest<'_>)) {
     for (name, profile) in corpus::roads() {
-        if !["rolling2", "hilly5", "test_site"].contains(&name) {
+        if !ROADS.contains(&name) {
             continue;
         }
         for mass in [19_000.0, 55_000.0] {
@@ -31,19 +37,60 @@ fn trips(c: &mut Criterion) {
                 eco_roll: false,
                 tuning: Tuning::default(),
             };
-            let trip = Trip::new(&request).unwrap();
-            let end = *trip.cruise.e_j_kg.last().unwrap();
-            let mut solver = DefaultSolver::default();
-            group.bench_function(format!("{name}_{:.0}t", mass / 1e3), |b| {
-                b.iter(|| {
-                    let mut solve = |a: &_, b, c, d: Option<&[f64]>| solver.solve(a, b, c, d);
-                    black_box(trip.solve(trip.cruise.trip_time_s(), end, &mut solve))
-                });
-            });
+            run(&format!("{name}_{:.0}t", mass / 1e3), &request);
         }
     }
+}
+
+fn trips(c: &mut Criterion) {
+    let mut group = c.benchmark_group("trip_15_km");
+    group.sample_size(10);
+    each_trip(|name, request| {
+        let mut solver = DefaultSolver::default();
+        group.bench_function(format!("{name}/structured"), |b| {
+            b.iter(|| {
+                let mut solve = |a: &_, b, c, d: Option<&[f64]>| solver.solve(a, b, c, d);
+                black_box(plan_trip_with(request, &mut solve))
+            });
+        });
+        group.bench_function(format!("{name}/clarabel"), |b| {
+            b.iter(|| black_box(plan_trip_with(request, &mut clarabel_backend::solve)));
+        });
+    });
     group.finish();
 }
 
-criterion_group!(benches, trips);
+fn replans(c: &mut Criterion) {
+    let mut group = c.benchmark_group("replan_4_km");
+    group.sample_size(20);
+    each_trip(|name, request| {
+        let trip = Trip::new(request).unwrap();
+        let end = *trip.cruise.e_j_kg.last().unwrap();
+        let (driven, plan) =
+            trip.solve(trip.cruise.trip_time_s(), end, &mut clarabel_backend::solve);
+        let windows = replan::windows(&trip, &driven, plan.beta_g_s, 40);
+        let mut fast = Structured::default();
+        let mut at = 0;
+        group.bench_function(format!("{name}/structured"), |b| {
+            b.iter(|| {
+                at = (at + 1) % windows.len();
+                let mut solve = |sub: &Subproblem, end, time, _: Option<&[f64]>| {
+                    let mut found = Solution::default();
+                    fast.solve_into(sub, end, time, &mut found);
+                    found
+                };
+                black_box(windows[at].replan(&trip, &mut solve))
+            });
+        });
+        group.bench_function(format!("{name}/clarabel"), |b| {
+            b.iter(|| {
+                at = (at + 1) % windows.len();
+                black_box(windows[at].replan(&trip, &mut clarabel_backend::solve))
+            });
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, trips, replans);
 criterion_main!(benches);

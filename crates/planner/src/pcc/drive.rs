@@ -91,21 +91,88 @@ pub(crate) fn demand_m_s2(
     e0: f64,
     e1: f64,
 ) -> f64 {
-    let mean = 0.5 * (e0 + e1);
-    let overrun = match drive {
-        Drive::Gear(g) => truck.overrun_m_s2(g as usize, libm::sqrt(2.0 * mean)),
-        Drive::Neutral => 0.0,
-    };
-    truck.inertia(drive) * (e1 - e0) / course.h_m
-        + overrun
-        + truck.resistance_m_s2(mean, course.sin[k], course.cos[k])
+    demand_and_limit(truck, course, k, drive, e0, e1).0
 }
 
-fn traction_limit(truck: &Truck, drive: Drive, mean_e: f64) -> f64 {
-    match drive {
-        Drive::Gear(g) => truck.traction_m_s2(g as usize, libm::sqrt(2.0 * mean_e)),
-        Drive::Neutral => 0.0,
+/// [`demand_m_s2`] and the full load's traction at the mean energy, m/s².
+fn demand_and_limit(
+    truck: &Truck,
+    course: &Course,
+    k: usize,
+    drive: Drive,
+    e0: f64,
+    e1: f64,
+) -> (f64, f64) {
+    let mean = 0.5 * (e0 + e1);
+    let (overrun, limit) = match drive {
+        Drive::Gear(g) => truck.forces_m_s2(g as usize, libm::sqrt(2.0 * mean)),
+        Drive::Neutral => (0.0, 0.0),
+    };
+    let demand = truck.inertia(drive) * (e1 - e0) / course.h_m
+        + overrun
+        + truck.resistance_m_s2(mean, course.sin[k], course.cos[k]);
+    (demand, limit)
+}
+
+/// Excess of demand over full load that counts as none, m/s².
+const POWER_ROUNDING: f64 = 1e-11;
+
+/// The highest energy up to `target` that full load reaches: the root of demand minus full load,
+/// which rises with `e1` almost linearly. False position with Illinois' safeguard.
+fn full_load_energy(
+    truck: &Truck,
+    course: &Course,
+    k: usize,
+    drive: Drive,
+    e0: f64,
+    target: f64,
+    excess_at_target: f64,
+) -> f64 {
+    let excess = |e1: f64| {
+        let (demand, limit) = demand_and_limit(truck, course, k, drive, e0, e1);
+        demand - limit
+    };
+    let (mut high, mut f_high) = (target, excess_at_target);
+    // The inertia alone tells how far below the target the root lies, to first order.
+    let slope = truck.inertia(drive) / course.h_m;
+    let mut low = (target - 1.2 * excess_at_target / slope).max(E_FLOOR);
+    let mut f_low = excess(low);
+    if f_low > 0.0 {
+        (high, f_high) = (low, f_low);
+        low = E_FLOOR;
+        f_low = excess(low);
+        if f_low > 0.0 {
+            return E_FLOOR;
+        }
     }
+    let mut kept_low = 0;
+    for _ in 0..60 {
+        if high - low <= 1e-13 * high {
+            break;
+        }
+        let mut mid = high - f_high * (high - low) / (f_high - f_low);
+        if !(mid > low && mid < high) {
+            mid = 0.5 * (low + high);
+        }
+        let f = excess(mid);
+        if f.abs() <= POWER_ROUNDING {
+            return mid;
+        }
+        if f > 0.0 {
+            (high, f_high) = (mid, f);
+            kept_low = if kept_low > 0 { 2 } else { 1 };
+            if kept_low == 2 {
+                f_low *= 0.5;
+            }
+        } else {
+            (low, f_low) = (mid, f);
+            kept_low = if kept_low < 0 { -2 } else { -1 };
+            if kept_low == -2 {
+                f_high *= 0.5;
+            }
+        }
+    }
+    low
 }
 
 /// Drives interval `k` toward `target_e`, with no more than full load and the planned brakes.
@@ -117,51 +184,23 @@ pub fn drive_leg(
     e0: f64,
     target_e: f64,
 ) -> Leg {
-    let target = target_e.max(E_FLOOR);
-    let excess = |e1: f64| {
-        demand_m_s2(truck, course, k, drive, e0, e1) - traction_limit(truck, drive, 0.5 * (e0 + e1))
-    };
-    let mut e1 = target;
-    if excess(e1) > 0.0 {
-        // Full load does not reach the target: the highest energy that it does reach.
-        let (mut low, mut high) = (E_FLOOR, target);
-        let (mut f_low, mut f_high) = (excess(low), excess(high));
-        if f_low > 0.0 {
-            high = low;
-        }
-        for _ in 0..60 {
-            if high - low <= 1e-12 * high {
-                break;
-            }
-            // Illinois-style false position: the excess is nearly linear in e1.
-            let mut mid = high - f_high * (high - low) / (f_high - f_low);
-            if !(mid > low && mid < high) {
-                mid = 0.5 * (low + high);
-            }
-            let f = excess(mid);
-            if f > 0.0 {
-                (high, f_high) = (mid, f);
-                f_low *= 0.5;
-            } else {
-                (low, f_low) = (mid, f);
-                f_high *= 0.5;
-                if f > -1e-12 {
-                    break;
-                }
-            }
-        }
-        e1 = low;
+    let mut e1 = target_e.max(E_FLOOR);
+    let (mut demand, mut limit) = demand_and_limit(truck, course, k, drive, e0, e1);
+    let reached = if demand > limit {
+        full_load_energy(truck, course, k, drive, e0, e1, demand - limit)
+    } else if demand < -course.brake_m_s2 {
+        let rest = (-course.brake_m_s2 - demand) * course.h_m / truck.inertia(drive);
+        (e1 + rest).max(e1)
     } else {
-        let demand = demand_m_s2(truck, course, k, drive, e0, e1);
-        if demand < -course.brake_m_s2 {
-            e1 = (e1 + (-course.brake_m_s2 - demand) * course.h_m / truck.inertia(drive))
-                .max(target);
-        }
+        e1
+    };
+    if reached != e1 {
+        e1 = reached;
+        (demand, limit) = demand_and_limit(truck, course, k, drive, e0, e1);
     }
-    let demand = demand_m_s2(truck, course, k, drive, e0, e1);
     let mean = 0.5 * (e0 + e1);
     let time_s = duration_s(course.h_m, e0, e1);
-    let p = demand.max(0.0).min(traction_limit(truck, drive, mean));
+    let p = demand.max(0.0).min(limit);
     // Rounding must not turn fuel cut-off into injection.
     let p = if p < 1e-7 { 0.0 } else { p };
     let brake = if demand < -1e-9 { -demand } else { 0.0 };

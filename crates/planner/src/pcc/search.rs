@@ -16,18 +16,58 @@ use super::truck::{Drive, Truck};
 
 /// Energy step of the engine tables, J/kg.
 const TABLE_STEP: f64 = 0.5;
-/// Traction levels of the engine tables.
-const LEVELS: usize = 25;
+/// Traction levels from zero wheel force to full load.
+const LEVELS: usize = 12;
 
-/// One gear at one energy.
-#[derive(Debug, Clone)]
+/// One gear at one energy, one cache line. Fuel is piecewise linear in the traction: one piece from
+/// the first injection to zero wheel force, where the driveline's losses change sides, equal pieces
+/// from there to full load.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 struct Point {
-    /// Overrun drag per mass, m/s².
-    drag: f64,
+    /// Overrun drag per mass, which is the traction at zero wheel force, m/s².
+    drag: f32,
     /// Traction limit, m/s²; negative where the gear does not drive.
-    limit: f64,
-    /// Fuel per metre at equal steps of traction from zero to the limit, g/m.
-    fuel_g_m: [f64; LEVELS],
+    limit: f32,
+    /// Pieces per traction above zero wheel force, s²/m.
+    per_traction: f32,
+    /// Fuel per metre just above cut-off, g/m.
+    least_g_m: f32,
+    /// Fuel per metre at the levels, g/m.
+    fuel_g_m: [f32; LEVELS],
+}
+
+impl Point {
+    const IDLE: Self =
+        Self { drag: 0.0, limit: -1.0, per_traction: 0.0, least_g_m: 0.0, fuel_g_m: [0.0; LEVELS] };
+
+    fn new(truck: &Truck, g: usize, v: f64) -> Self {
+        if !truck.usable(g, v) {
+            return Self::IDLE;
+        }
+        let drive = Drive::Gear(g as u8);
+        let (drag, top) = truck.forces_m_s2(g, v);
+        let piece = (top - drag).max(0.0) / (LEVELS - 1) as f64;
+        let fuel = |p: f64| (truck.fuel_charged_g_s(drive, v, p) / v) as f32;
+        Self {
+            drag: drag as f32,
+            limit: top as f32,
+            per_traction: if piece > 1e-9 { (1.0 / piece) as f32 } else { 0.0 },
+            least_g_m: fuel(0.0),
+            fuel_g_m: core::array::from_fn(|i| fuel(drag + i as f64 * piece)),
+        }
+    }
+
+    #[inline]
+    fn fuel_g_m(&self, p: f32) -> f32 {
+        if p < self.drag {
+            self.least_g_m + (self.fuel_g_m[0] - self.least_g_m) * p / self.drag
+        } else {
+            let u = (p - self.drag) * self.per_traction;
+            let l = (u as u32).min(LEVELS as u32 - 2) as usize;
+            self.fuel_g_m[l] + (u - l as f32) * (self.fuel_g_m[l + 1] - self.fuel_g_m[l])
+        }
+    }
 }
 
 /// Engine figures over energy, per gear.
@@ -42,29 +82,42 @@ impl EngineTables {
     #[must_use]
     pub fn new(truck: &Truck, top_e: f64) -> Self {
         let rows = (top_e / TABLE_STEP) as usize + 3;
-        let mut points = Vec::with_capacity(rows * truck.gears());
-        for g in 0..truck.gears() {
-            let (slowest, fastest) = truck.speed_range_m_s(g);
-            for r in 0..rows {
-                let v = libm::sqrt(2.0 * (r as f64 * TABLE_STEP).max(0.1));
-                let near = v >= slowest - 0.5 && v <= fastest + 0.5;
-                let top = truck.traction_m_s2(g, v);
-                let drive = Drive::Gear(g as u8);
-                points.push(Point {
-                    drag: truck.overrun_m_s2(g, v),
-                    limit: if truck.usable(g, v) { top } else { -1.0 },
-                    fuel_g_m: core::array::from_fn(|i| {
-                        if !near {
-                            return 0.0;
-                        }
-                        let p = top * i as f64 / (LEVELS - 1) as f64;
-                        truck.fuel_charged_g_s(drive, v, p) / v
-                    }),
-                });
-            }
-        }
+        let speed = |r: usize| libm::sqrt(2.0 * (r as f64 * TABLE_STEP).max(0.1));
+        let points = (0..truck.gears())
+            .flat_map(|g| (0..rows).map(move |r| (g, r)))
+            .map(|(g, r)| Point::new(truck, g, speed(r)))
+            .collect();
         Self { rows, points }
     }
+
+    /// Gears that drive somewhere, each with its figures at the mean energies of a grid: entry `m`
+    /// belongs to two indices that sum to `m + 2 lowest`.
+    fn on(&self, truck: &Truck, grid: &SearchGrid) -> Vec<Gear> {
+        let lowest = grid.low.iter().copied().min().unwrap_or(0);
+        let highest = grid.low.iter().zip(&grid.count).map(|(l, c)| l + *c as i32).max();
+        let count = 2 * (highest.unwrap_or(lowest) - lowest).max(0) as usize + 1;
+        let row_of = |m: usize| {
+            let mean = grid.start_e + (f64::from(lowest) + 0.5 * m as f64) * grid.step_e;
+            ((mean.max(0.0) / TABLE_STEP + 0.5) as usize).min(self.rows - 1)
+        };
+        self.points
+            .chunks_exact(self.rows)
+            .enumerate()
+            .map(|(g, all)| Gear {
+                index: g,
+                inertia: truck.inertia(Drive::Gear(g as u8)),
+                points: (0..count).map(|m| all[row_of(m)]).collect(),
+            })
+            .filter(|gear| gear.points.iter().any(|p| p.limit > 0.0))
+            .collect()
+    }
+}
+
+/// A gear on a grid.
+struct Gear {
+    index: usize,
+    inertia: f64,
+    points: Vec<Point>,
 }
 
 /// Nodes with their windows of energies, and the intervals between them.
@@ -178,35 +231,61 @@ pub fn search(
     prices: &SearchPrices,
     start_gear: Option<u8>,
 ) -> Option<SearchPath> {
-    let (n, m) = (grid.n(), truck.gears());
+    let n = grid.n();
+    let gears = tables.on(truck, grid);
+    let m = gears.len();
+    let lowest = grid.low.iter().copied().min()?;
     let c0 = grid.count[0] as usize;
     let mut cost = alloc::vec![f64::INFINITY; c0 * m];
     let first = usize::try_from(-grid.low[0]).ok().filter(|&i| i < c0)?;
-    for g in 0..m {
-        let same = start_gear.is_none_or(|s| s as usize == g);
-        cost[first * m + g] = if same { 0.0 } else { prices.shift_fuel_g };
+    for (slot, gear) in gears.iter().enumerate() {
+        let same = start_gear.is_none_or(|s| s as usize == gear.index);
+        cost[first * m + slot] = if same { 0.0 } else { prices.shift_fuel_g };
     }
     let mut parents: Vec<Vec<u32>> = Vec::with_capacity(n);
     let mut speeds = alloc::vec![libm::sqrt(2.0 * grid.start_e); c0];
+    let mut of_time = Vec::new();
     for k in 0..n {
         let c1 = grid.count[k + 1] as usize;
         let mut next = alloc::vec![f64::INFINITY; c1 * m];
         let mut parent = alloc::vec![u32::MAX; c1 * m];
         let after: Vec<f64> =
             (0..c1).map(|j| libm::sqrt(2.0 * grid.energy(k + 1, j).max(0.02))).collect();
+        let mut stage = Stage {
+            h: grid.h_m,
+            step_e: grid.step_e,
+            drag_1_m: truck.drag_1_m,
+            road: truck.resistance_m_s2(0.0, grid.sin[k], grid.cos[k]),
+            rise: grid.low[k + 1] - grid.low[k],
+            brake: prices.brake_m_s2,
+            free_cut: prices.free_cut,
+            gears: m,
+            next: &mut next,
+            parent: &mut parent,
+        };
         for (i, row) in cost.chunks_exact(m).enumerate() {
             let best = (0..m).min_by(|&a, &b| row[a].total_cmp(&row[b]))?;
             if !row[best].is_finite() {
                 continue;
             }
-            for g in 0..m {
-                let (base, came) = if row[g] <= row[best] + prices.shift_fuel_g {
-                    (row[g], g)
+            let e0 = grid.energy(k, i);
+            let gained = grid.low[k + 1] - grid.low[k] - i as i32;
+            let of_step = grid.step_e / grid.h_m;
+            let per_step = prices.accel_penalty_g_s3_m2 * of_step * of_step;
+            of_time.clear();
+            of_time.extend(after.iter().zip(gained..).map(|(v1, steps)| {
+                let steps = f64::from(steps);
+                2.0 * grid.h_m / (speeds[i] + v1) * (prices.beta_g_s + per_step * steps * steps)
+            }));
+            let sum = (grid.low[k] + grid.low[k + 1] - 2 * lowest) as usize + i;
+            for (slot, gear) in gears.iter().enumerate() {
+                let (base, came) = if row[slot] <= row[best] + prices.shift_fuel_g {
+                    (row[slot], slot)
                 } else {
                     (row[best] + prices.shift_fuel_g, best)
                 };
-                let edge = Edge { k, i, g, base, code: (i * m + came) as u32, v0: speeds[i] };
-                expand(truck, tables, grid, prices, &edge, &after, &mut next, &mut parent);
+                let code = (i * m + came) as u32;
+                stage.expand(gear, slot, (i, e0), (base, code), sum, &of_time);
             }
         }
         parents.push(parent);
@@ -219,79 +298,88 @@ pub fn search(
         return None;
     }
     let mut e = alloc::vec![grid.start_e; n + 1];
-    let mut gears = alloc::vec![0u8; n];
+    let mut path = alloc::vec![0u8; n];
     for k in (0..n).rev() {
         e[k + 1] = grid.energy(k + 1, at / m);
-        gears[k] = (at % m) as u8;
+        path[k] = gears[at % m].index as u8;
         at = parents[k][at] as usize;
     }
     let time_s = e.windows(2).map(|w| super::drive::duration_s(grid.h_m, w[0], w[1])).sum();
-    Some(SearchPath { e_j_kg: e, gears, cost_g, time_s })
+    Some(SearchPath { e_j_kg: e, gears: path, cost_g, time_s })
 }
 
-struct Edge {
-    k: usize,
-    i: usize,
-    g: usize,
-    base: f64,
-    code: u32,
-    v0: f64,
+/// One interval of a search.
+struct Stage<'a> {
+    h: f64,
+    step_e: f64,
+    drag_1_m: f64,
+    /// Rolling and climbing resistance per mass, m/s².
+    road: f64,
+    /// Lowest index after minus lowest index before.
+    rise: i32,
+    brake: f64,
+    free_cut: bool,
+    gears: usize,
+    next: &'a mut [f64],
+    parent: &'a mut [u32],
 }
 
-/// All edges from one state in one gear.
-fn expand(
-    truck: &Truck,
-    tables: &EngineTables,
-    grid: &SearchGrid,
-    prices: &SearchPrices,
-    edge: &Edge,
-    after: &[f64],
-    next: &mut [f64],
-    parent: &mut [u32],
-) {
-    let (k, g, m, h) = (edge.k, edge.g, truck.gears(), grid.h_m);
-    let e0 = grid.energy(k, edge.i);
-    let mu = truck.inertia(Drive::Gear(g as u8));
-    let road = truck.resistance_m_s2(0.0, grid.sin[k], grid.cos[k]);
-    let at0 = ((e0 / TABLE_STEP + 0.5) as usize).min(tables.rows - 1);
-    let drag0 = tables.points[g * tables.rows + at0].drag;
-    // Braking pays only where the next node's ceiling lies below coasting.
-    let coast = e0 - h * (road + drag0 + truck.drag_1_m * e0) / mu;
-    let ceiling = grid.energy(k + 1, after.len() - 1);
-    let lowest = coast.min(ceiling) - 1.5 * grid.step_e;
-    let first = libm::ceil((lowest - grid.start_e) / grid.step_e) as i32 - grid.low[k + 1];
-    for (j, &v1) in after.iter().enumerate().skip(first.max(0) as usize) {
-        let e1 = grid.energy(k + 1, j);
-        let mean = 0.5 * (e0 + e1);
-        let row = ((mean / TABLE_STEP + 0.5) as usize).min(tables.rows - 1);
-        let point = &tables.points[g * tables.rows + row];
-        let accel = (e1 - e0) / h;
-        let need = mu * accel + point.drag + road + truck.drag_1_m * mean;
-        if need > point.limit {
-            if accel > 0.0 {
-                break;
+impl Stage<'_> {
+    /// All edges from index `i` at energy `e0` in one gear, at the cost `base` so far.
+    fn expand(
+        &mut self,
+        gear: &Gear,
+        slot: usize,
+        (i, e0): (usize, f64),
+        (base, code): (f64, u32),
+        sum: usize,
+        of_time: &[f64],
+    ) {
+        // need = level + slope × (energy steps gained) + drag
+        let inertia = gear.inertia / self.h;
+        let level = self.road + self.drag_1_m * e0;
+        let slope = self.step_e * (inertia + 0.5 * self.drag_1_m);
+        // Braking pays only where the next node's ceiling lies below coasting.
+        let level_point = ((sum as i32 - self.rise) as usize + i).min(gear.points.len() - 1);
+        let coast = -(level + f64::from(gear.points[level_point].drag)) / (inertia * self.step_e);
+        let gained = self.rise - i as i32;
+        let ceiling = f64::from(gained + of_time.len() as i32 - 1);
+        let first = (libm::ceil(coast.min(ceiling) - 1.5) as i32 - gained).max(0) as usize;
+        let h = self.h;
+        let count = of_time.len();
+        if first >= count {
+            return;
+        }
+        let points = &gear.points[sum + first..sum + count];
+        for (((j, point), time), (cost, parent)) in
+            (first..count).zip(points).zip(&of_time[first..count]).zip(
+                self.next[first * self.gears + slot..]
+                    .iter_mut()
+                    .step_by(self.gears)
+                    .zip(self.parent[first * self.gears + slot..].iter_mut().step_by(self.gears)),
+            )
+        {
+            let steps = gained + j as i32;
+            let need = (level + slope * f64::from(steps)) as f32 + point.drag;
+            if need > point.limit {
+                if steps > 0 {
+                    break;
+                }
+                continue;
             }
-            continue;
-        }
-        if need < -prices.brake_m_s2 {
-            continue;
-        }
-        let u = need.max(0.0) / point.limit * (LEVELS - 1) as f64;
-        let l = (u as usize).min(LEVELS - 2);
-        let f = &point.fuel_g_m;
-        let fuel = if prices.free_cut && need <= 0.0 {
-            0.0
-        } else {
-            h * (f[l] + (u - l as f64) * (f[l + 1] - f[l]))
-        };
-        let seconds = 2.0 * h / (edge.v0 + v1);
-        let total = edge.base
-            + fuel
-            + seconds * (prices.beta_g_s + prices.accel_penalty_g_s3_m2 * accel * accel);
-        let slot = j * m + g;
-        if total < next[slot] {
-            next[slot] = total;
-            parent[slot] = edge.code;
+            if f64::from(need) < -self.brake {
+                continue;
+            }
+            let fuel = if need > 0.0 || !self.free_cut {
+                h * f64::from(point.fuel_g_m(need.max(0.0)))
+            } else {
+                0.0
+            };
+            let total = base + fuel + time;
+            if total < *cost {
+                *cost = total;
+                *parent = code;
+            }
         }
     }
 }

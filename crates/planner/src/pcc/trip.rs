@@ -160,6 +160,7 @@ pub struct Trip {
     pub overspeed: Driven,
     /// Fastest possible trip, s.
     pub fastest_s: f64,
+    tables: EngineTables,
     eco_roll: bool,
     set_m_s: f64,
 }
@@ -202,8 +203,10 @@ impl Trip {
                 lowest.min(0.5 * v * v)
             })
             .collect();
+        let tables = EngineTables::new(&truck, e_max.iter().copied().fold(0.0, f64::max));
         Ok(Self {
             truck,
+            tables,
             course,
             tuning,
             e_min,
@@ -256,13 +259,23 @@ impl Trip {
         end_e: f64,
         solver: &mut Solver<'_>,
     ) -> (Driven, Profile) {
+        self.solve_near(trip_time_s, end_e, self.beta_guess(), solver)
+    }
+
+    /// [`Trip::solve`] with a guess of the price of time, g/s, from a similar trip time.
+    pub fn solve_near(
+        &self,
+        trip_time_s: f64,
+        end_e: f64,
+        beta_g_s: f64,
+        solver: &mut Solver<'_>,
+    ) -> (Driven, Profile) {
         let mut problem = self.problem(trip_time_s, end_e);
-        let tables = EngineTables::new(&self.truck, self.e_max.iter().copied().fold(0.0, f64::max));
         let cruise = (self.cruise.e_j_kg.as_slice(), self.cruise.drive.as_slice());
-        let mut beta = self.beta_guess();
+        let mut beta = beta_g_s;
         let mut best: Option<(f64, Driven, Profile)> = None;
         for fineness in SEARCH_FINENESS {
-            let (mut e, mut gears) = problem.first_profile(&tables, beta, fineness, cruise);
+            let (mut e, mut gears) = problem.first_profile(&self.tables, beta, fineness, cruise);
             for _ in 0..2 {
                 // One subproblem tells the price of time, which the gear search is asked again with.
                 let probe = Iterations { most: 1, ..Iterations::TRIP };
@@ -272,7 +285,7 @@ impl Trip {
                 if settled {
                     break;
                 }
-                (e, gears) = problem.first_profile(&tables, beta, fineness, cruise);
+                (e, gears) = problem.first_profile(&self.tables, beta, fineness, cruise);
             }
             let profile = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
             beta = profile.beta_g_s;
@@ -381,16 +394,18 @@ pub fn plan_trip_with(
 ) -> Result<TripResult, PccError> {
     let trip = Trip::new(request)?;
     let end = |d: &Driven| d.e_j_kg[d.e_j_kg.len() - 1];
-    let against = |d: &Driven, solver: &mut Solver<'_>| {
-        let (plan, profile) = trip.solve(d.trip_time_s(), end(d).min(trip.end_cap()), solver);
+    let against = |d: &Driven, beta_g_s: f64, solver: &mut Solver<'_>| {
+        let (goal, end) = (d.trip_time_s(), end(d).min(trip.end_cap()));
+        let (plan, profile) = trip.solve_near(goal, end, beta_g_s, solver);
         let saved = 1.0 - plan.total_fuel_g() / d.total_fuel_g().max(1e-9);
         (saved, plan, profile)
     };
-    let (saving_cruise, mut plan, mut profile) = against(&trip.cruise, solver);
-    let (saving_over, ..) = against(&trip.overspeed, solver);
+    let (saving_cruise, mut plan, mut profile) = against(&trip.cruise, trip.beta_guess(), solver);
+    let beta = if profile.beta_g_s > 0.0 { profile.beta_g_s } else { trip.beta_guess() };
+    let (saving_over, ..) = against(&trip.overspeed, beta, solver);
     let goal = request.trip_time_s.unwrap_or(trip.cruise.trip_time_s());
     if request.trip_time_s.is_some() {
-        (plan, profile) = trip.solve(goal, end(&trip.cruise), solver);
+        (plan, profile) = trip.solve_near(goal, end(&trip.cruise), beta, solver);
     }
     let mut status = match profile.status {
         SolveStatus::Solved => TripStatus::Solved,

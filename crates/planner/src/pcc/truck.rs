@@ -199,19 +199,30 @@ impl Truck {
     /// Overrun drag per mass at fuel cut-off, `D/m`, m/s².
     #[must_use]
     pub fn overrun_m_s2(&self, g: usize, v_m_s: f64) -> f64 {
-        let w = self.engine_speed(g, v_m_s);
-        (self.friction_nm.at(w) + self.auxiliary_power_w / w) * self.ratio_rad_m[g]
-            / (self.efficiency_frac[g] * self.mass_kg)
+        self.drag_n(g, self.engine_speed(g, v_m_s)) / self.mass_kg
     }
 
     /// Largest specific indicated traction `φ = (F_max + D)/m`, m/s².
     #[must_use]
     pub fn traction_m_s2(&self, g: usize, v_m_s: f64) -> f64 {
+        self.forces_m_s2(g, v_m_s).1
+    }
+
+    /// Overrun drag at an engine speed, `D`, N.
+    fn drag_n(&self, g: usize, w: f64) -> f64 {
+        (self.friction_nm.at(w) + self.auxiliary_power_w / w) * self.ratio_rad_m[g]
+            / self.efficiency_frac[g]
+    }
+
+    /// Overrun drag and traction limit together, m/s²: as [`Truck::overrun_m_s2`] and
+    /// [`Truck::traction_m_s2`].
+    #[must_use]
+    pub fn forces_m_s2(&self, g: usize, v_m_s: f64) -> (f64, f64) {
         let w = self.engine_speed(g, v_m_s);
-        let aux = self.auxiliary_power_w / w;
-        let net = (self.full_load_nm.at(w) - aux).max(0.0);
-        let (i, eta) = (self.ratio_rad_m[g], self.efficiency_frac[g]);
-        (net * i * eta + (self.friction_nm.at(w) + aux) * i / eta) / self.mass_kg
+        let net = (self.full_load_nm.at(w) - self.auxiliary_power_w / w).max(0.0);
+        let drag = self.drag_n(g, w);
+        let pull = net * self.ratio_rad_m[g] * self.efficiency_frac[g];
+        (drag / self.mass_kg, (pull + drag) / self.mass_kg)
     }
 
     /// Indicated engine torque for specific traction `p`, Nm, with engine speed and friction torque.

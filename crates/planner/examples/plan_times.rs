@@ -1,0 +1,126 @@
+//! Times of whole-trip plans and of 4 km replans, with the structured solver and with Clarabel.
+//!
+//! `cargo run --release -p planner --example plan_times [-- ROAD]`
+//!
+//! Processor time of the thread, so that other work on the machine disturbs less; a replan is two
+//! subproblems, linearisation, driving and bounds included.
+#![allow(clippy::disallowed_macros, clippy::disallowed_methods, clippy::unwrap_used)]
+
+#[allow(dead_code)]
+#[path = "../tests/support/pcc/corpus.rs"]
+mod corpus;
+#[path = "../tests/support/data_sheet.rs"]
+mod data_sheet;
+#[path = "../tests/support/pcc/replan.rs"]
+mod replan;
+
+use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
+use planner::pcc::solution::{Solution, SolveStatus};
+use planner::pcc::solver::DefaultSolver;
+use planner::pcc::structured::Structured;
+use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
+use planner::pcc::{SpeedBand, Tuning, clarabel_backend};
+use rustix::time::{ClockId, clock_gettime};
+
+fn now_ms() -> f64 {
+    let t = clock_gettime(ClockId::ThreadCPUTime);
+    t.tv_sec as f64 * 1e3 + t.tv_nsec as f64 * 1e-6
+}
+
+/// The least of three runs, ms.
+fn least_ms<T>(mut run: impl FnMut() -> T) -> (f64, T) {
+    let mut best = f64::INFINITY;
+    for _ in 0..2 {
+        let t = now_ms();
+        run();
+        best = best.min(now_ms() - t);
+    }
+    let t = now_ms();
+    let result = run();
+    (best.min(now_ms() - t), result)
+}
+
+fn percentiles(name: &str, mut ms: Vec<f64>) {
+    ms.sort_by(f64::total_cmp);
+    let at = |f: f64| ms[((ms.len() - 1) as f64 * f).round() as usize];
+    println!(
+        "{name}: {} replans, p50 {:.3} ms, p90 {:.3} ms, p99 {:.3} ms, max {:.3} ms",
+        ms.len(),
+        at(0.5),
+        at(0.9),
+        at(0.99),
+        at(1.0)
+    );
+}
+
+fn main() {
+    let only = std::env::args().nth(1);
+    let (mut of_structured, mut of_clarabel) = (Vec::new(), Vec::new());
+    println!(
+        "road mass_t | prepare_ms solve_ms plan_trip_ms | subproblems iterations in_solver_ms second_opinions | clarabel plan_trip_ms"
+    );
+    for (name, profile) in corpus::roads() {
+        if only.as_ref().is_some_and(|o| !name.contains(o.as_str())) {
+            continue;
+        }
+        for mass in [19_000.0, 55_000.0] {
+            let mut limits = data_sheet::reference_limits();
+            limits.road_load.mass_kg = mass;
+            let request = TripRequest {
+                profile: &profile,
+                truck: &limits,
+                band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
+                trip_time_s: None,
+                eco_roll: false,
+                tuning: Tuning::default(),
+            };
+            let mut solver = DefaultSolver::default();
+            let mut default = |a: &Subproblem, b: Terminal, c: TimeRule, d: Option<&[f64]>| {
+                solver.solve(a, b, c, d)
+            };
+            let (prepare, trip) = least_ms(|| Trip::new(&request).unwrap());
+            let end = *trip.cruise.e_j_kg.last().unwrap();
+            let goal = trip.cruise.trip_time_s();
+            let (solve, (driven, plan)) = least_ms(|| trip.solve(goal, end, &mut default));
+            let (whole, _) = least_ms(|| plan_trip_with(&request, &mut default).unwrap());
+            let (mut calls, mut iterations, mut inside, mut second) = (0, 0, 0.0, 0);
+            let mut fast = Structured::default();
+            trip.solve(goal, end, &mut |sub, end, time, fence| {
+                let t = now_ms();
+                let mut found = Solution::default();
+                fast.solve_into(sub, end, time, &mut found);
+                inside += now_ms() - t;
+                calls += 1;
+                iterations += found.iterations;
+                if found.status != SolveStatus::Solved {
+                    second += 1;
+                    return clarabel_backend::solve(sub, end, time, fence);
+                }
+                found
+            });
+            let t = now_ms();
+            plan_trip_with(&request, &mut clarabel_backend::solve).unwrap();
+            let clarabel = now_ms() - t;
+            println!(
+                "{name:9} {:2.0} | {prepare:6.2} {solve:6.2} {whole:6.2} | {calls:2} {iterations:3} {inside:6.2} {second} | {clarabel:7.1}",
+                mass / 1e3
+            );
+            for window in replan::windows(&trip, &driven, plan.beta_g_s, 11) {
+                let mut own = |sub: &Subproblem, end, time, _: Option<&[f64]>| {
+                    let mut found = Solution::default();
+                    fast.solve_into(sub, end, time, &mut found);
+                    found
+                };
+                let t = now_ms();
+                let found = window.replan(&trip, &mut own);
+                of_structured.push(now_ms() - t);
+                assert_eq!(found.status, SolveStatus::Solved, "{name} {mass}");
+                let t = now_ms();
+                window.replan(&trip, &mut clarabel_backend::solve);
+                of_clarabel.push(now_ms() - t);
+            }
+        }
+    }
+    percentiles("structured", of_structured);
+    percentiles("Clarabel", of_clarabel);
+}

@@ -1,0 +1,350 @@
+//! One Newton system: residuals and reduced matrix in one sweep, directions in one sweep each.
+//!
+//! Per interval, `y` weights of its inequalities act through four sums: on the traction
+//! `P = -y0 + y1 - y5`, on the mean energy `-φ' y1`, on the brake `y2 - y3`, on `u` `y4 + y5`, and on
+//! the energy at its end `y6 - y7`.
+
+use super::{ROWS, Structured};
+use crate::pcc::lin::{Subproblem, Terminal, TimeRule};
+
+/// Largest residuals and mean complementarity of a point.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Residuals {
+    pub(super) primal: f64,
+    pub(super) dual: f64,
+    pub(super) mu: f64,
+}
+
+/// Parts of an interval's Newton system that stay after `b` and `u` are eliminated.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Eliminated {
+    /// Weights of rows 4 and 5, and the inverse of their sum.
+    w5: f64,
+    inverse_u: f64,
+    /// Coupling of the brake with the energies, and the inverse of its own entry.
+    x0: f64,
+    x1: f64,
+    inverse_b: f64,
+    /// Right-hand sides of `u` and of `b` after `u`.
+    right_u: f64,
+    right_b: f64,
+}
+
+/// Sums of row weights by what they act on.
+#[inline]
+fn gather(y: &[f64; ROWS]) -> (f64, f64, f64, f64) {
+    (y[1] - y[0] - y[5], y[2] - y[3], y[4] + y[5], y[6] - y[7])
+}
+
+#[inline]
+fn times(a: &[f64; ROWS], b: &[f64; ROWS]) -> [f64; ROWS] {
+    core::array::from_fn(|i| a[i] * b[i])
+}
+
+#[inline]
+fn largest(seen: f64, values: &[f64; ROWS]) -> f64 {
+    values.iter().fold(seen, |m, v| if v.abs() > m { v.abs() } else { m })
+}
+
+impl Structured {
+    /// Gradient of the cost alone, into `grad_e` and `grad_b`.
+    fn cost_gradient(&mut self, n: usize) {
+        let q = &self.quad;
+        let (e, b) = (&self.e[..n], &self.b[..n]);
+        let (ge, gb) = (&mut self.grad_e[..n], &mut self.grad_b[..n]);
+        let (d0, d1, d2) = (&q.d0[..n], &q.d1[..n], &q.d2[..n]);
+        let (x0, x1, bb) = (&q.x0[..n], &q.x1[..n], &q.bb[..n]);
+        let (c, cb) = (&q.ge[..n], &q.gb[..n]);
+        for i in 0..n {
+            ge[i] = c[i] + d0[i] * e[i] + x1[i] * b[i];
+            gb[i] = cb[i] + bb[i] * b[i] + x1[i] * e[i];
+        }
+        for i in 1..n {
+            ge[i] += d1[i - 1] * e[i - 1];
+            ge[i - 1] += d1[i - 1] * e[i] + x0[i] * b[i];
+            gb[i] += x0[i] * e[i - 1];
+        }
+        for i in 2..n {
+            ge[i] += d2[i - 2] * e[i - 2];
+            ge[i - 2] += d2[i - 2] * e[i];
+        }
+    }
+
+    /// Residuals at the current point; the reduced Newton matrix into `band`, the right-hand side of
+    /// the predictor (complementarity zero) into `base` and `parts`.
+    pub(super) fn assemble(
+        &mut self,
+        sub: &Subproblem,
+        terminal: Terminal,
+        time: TimeRule,
+    ) -> Residuals {
+        let n = sub.n;
+        let fixed = matches!(terminal, Terminal::Fixed(_));
+        self.cost_gradient(n);
+        self.band.m0.copy_from_slice(&self.quad.d0);
+        self.band.m1.copy_from_slice(&self.quad.d1);
+        self.band.m2.copy_from_slice(&self.quad.d2);
+        for (r, g) in self.base.iter_mut().zip(&self.grad_e) {
+            *r = -g;
+        }
+        let (mut primal, mut dual, mut sum, mut count) = (0.0f64, 0.0f64, 0.0, 8.0 * n as f64);
+        let mut e0 = sub.start_e;
+        for k in 0..n {
+            let ended = fixed && k + 1 == n;
+            let row = &mut self.rows[k];
+            let (a0, a1, half) = (sub.a0[k], sub.a1[k], 0.5 * sub.phi1[k]);
+            let (e1, b, u) = (self.e[k], self.b[k], self.u[k]);
+            let p = a0 * e0 + a1 * e1 + b + sub.r[k];
+            let over = [
+                -p,
+                p - half * (e0 + e1) - sub.phi0[k],
+                b - sub.b_max,
+                -b,
+                u - sub.kink[k],
+                u - p,
+                e1 - sub.e_max[k + 1],
+                sub.e_min[k + 1] - e1,
+            ];
+            for (i, over) in over.into_iter().enumerate() {
+                row.inverse_s[i] = 1.0 / row.s[i];
+                row.rp[i] = over + row.s[i];
+            }
+            if ended {
+                (row.rp[6], row.rp[7]) = (0.0, 0.0);
+                (row.inverse_s[6], row.inverse_s[7]) = (0.0, 0.0);
+            }
+            primal = largest(primal, &row.rp);
+            sum += times(&row.s, &row.z).iter().sum::<f64>();
+            let w = times(&row.z, &row.inverse_s);
+            // Dual residual with z, right-hand side with W r_p.
+            let (zp, zb, zu, ze) = gather(&row.z);
+            let (tp, tb, tu, te) = gather(&times(&w, &row.rp));
+            let (bend_z, bend_t) = (half * row.z[1], half * w[1] * row.rp[1]);
+            let own_b = self.grad_b[k];
+            self.grad_e[k] += a1 * zp - bend_z + ze;
+            self.grad_b[k] = own_b + zp + zb;
+            let right_u = sub.discount[k] - tu;
+            let of_u = zu - sub.discount[k];
+            dual = dual.max(self.grad_b[k].abs()).max(of_u.abs());
+            // u eliminated: row 5 becomes a weight on p, in series with row 4.
+            let inverse_u = 1.0 / (w[4] + w[5]);
+            let wp = w[0] + w[4] * w[5] * inverse_u;
+            let share_u = w[5] * inverse_u * right_u;
+            let (f0, f1) = (a0 - half, a1 - half);
+            let q = &self.quad;
+            let inverse_b = 1.0 / (q.bb[k] + wp + w[1] + w[2] + w[3]);
+            let x1 = q.x1[k] + wp * a1 + w[1] * f1;
+            let right_b = share_u - own_b - tp - tb;
+            let share_b = inverse_b * right_b;
+            self.band.m0[k] += wp * a1 * a1 + w[1] * f1 * f1 + w[6] + w[7] - x1 * x1 * inverse_b;
+            self.base[k] += a1 * (share_u - tp) + bend_t - te - x1 * share_b;
+            let mut x0 = 0.0;
+            if k > 0 {
+                x0 = q.x0[k] + wp * a0 + w[1] * f0;
+                self.grad_e[k - 1] += a0 * zp - bend_z;
+                self.base[k - 1] += a0 * (share_u - tp) + bend_t - x0 * share_b;
+                self.band.m0[k - 1] += wp * a0 * a0 + w[1] * f0 * f0 - x0 * x0 * inverse_b;
+                self.band.m1[k - 1] += wp * a0 * a1 + w[1] * f0 * f1 - x0 * x1 * inverse_b;
+            }
+            self.parts[k] = Eliminated { w5: w[5], inverse_u, x0, x1, inverse_b, right_u, right_b };
+            e0 = e1;
+        }
+        if fixed {
+            count -= 2.0;
+        }
+        if let (Some(row), TimeRule::AtMost(t)) = (&mut self.time, time) {
+            let lasts =
+                self.known_time_s + self.t.iter().zip(&self.e).map(|(t, e)| t * e).sum::<f64>();
+            row.rp = lasts + row.s - t;
+            primal = primal.max(row.rp.abs());
+            let pull = -row.weight() * row.rp;
+            for ((g, r), t) in self.grad_e.iter_mut().zip(&mut self.base).zip(&self.t) {
+                *g += row.z * t;
+                *r += pull * t;
+            }
+            sum += row.s * row.z;
+            count += 1.0;
+        }
+        if let (Some(end), Terminal::Soft { reference, pay, credit }) = (&mut self.soft, terminal) {
+            let last = n - 1;
+            end.own.rp = end.own.s - end.slack;
+            end.spare.rp = end.spare.s - end.slack - self.e[last] + reference;
+            primal = primal.max(end.own.rp.abs()).max(end.spare.rp.abs());
+            self.grad_e[last] -= credit + end.spare.z;
+            self.base[last] += credit;
+            let left = pay - credit - end.own.z - end.spare.z;
+            dual = dual.max(left.abs());
+            let (w7, w8) = (end.own.weight(), end.spare.weight());
+            // Predictor: multipliers fall out of the right-hand sides.
+            end.right = -(pay - credit) + w7 * end.own.rp + w8 * end.spare.rp;
+            self.base[last] += w8 * end.spare.rp - w8 / (w7 + w8) * end.right;
+            self.band.m0[last] += w8 - w8 * w8 / (w7 + w8);
+            sum += end.own.s * end.own.z + end.spare.s * end.spare.z;
+            count += 2.0;
+        }
+        if fixed {
+            self.grad_e[n - 1] = 0.0;
+            self.base[n - 1] = 0.0;
+        }
+        dual = self.grad_e.iter().fold(dual, |m, g| m.max(g.abs()));
+        Residuals { primal, dual, mu: sum / count }
+    }
+
+    /// Factors the reduced matrix; false if a pivot is not positive.
+    pub(super) fn factor(&mut self, fixed: bool) -> bool {
+        if fixed {
+            self.band.pin_last();
+        }
+        self.band.factor()
+    }
+
+    /// Predictor: the step to complementarity zero, its reach, and `Σ ds dz`.
+    pub(super) fn predict(&mut self, sub: &Subproblem, fixed: bool) -> (f64, f64) {
+        self.de.copy_from_slice(&self.base);
+        if self.time.is_some() {
+            self.mt.copy_from_slice(&self.t);
+            if fixed {
+                self.mt[sub.n - 1] = 0.0;
+            }
+            self.band.solve_two(&mut self.de, &mut self.mt);
+        } else {
+            self.band.solve(&mut self.de);
+        }
+        self.border();
+        let (mut worst, mut product) = (0.0f64, 0.0);
+        let mut before = 0.0;
+        for k in 0..sub.n {
+            let (part, row) = (&self.parts[k], &mut self.rows[k]);
+            let de = self.de[k];
+            let (_, _, step) = part.recover(sub, k, before, de);
+            for (i, step) in step.into_iter().enumerate() {
+                let ds = -row.rp[i] - step;
+                // -ds/s, and -dz/z = 1 + ds/s.
+                let ratio = ds * row.inverse_s[i];
+                let w_ds = row.z[i] * ratio;
+                row.ds[i] = ds;
+                row.dz[i] = -row.z[i] - w_ds;
+                product += ds * row.dz[i];
+                let ratio = if -ratio > 1.0 + ratio { -ratio } else { 1.0 + ratio };
+                worst = if ratio > worst { ratio } else { worst };
+            }
+            before = de;
+        }
+        self.scalar_steps(|r| r.s * r.z);
+        self.scalars(|r| {
+            worst = worst.max(-r.ds / r.s).max(-r.dz / r.z);
+            product += r.ds * r.dz;
+        });
+        (1.0 / worst.max(1e-12), product)
+    }
+
+    /// Corrector: centring to `target` and the second-order term. Returns the reach.
+    pub(super) fn correct(&mut self, sub: &Subproblem, fixed: bool, target: f64) -> f64 {
+        let n = sub.n;
+        for k in 0..n {
+            let (part, row) = (&mut self.parts[k], &mut self.rows[k]);
+            for i in 0..ROWS {
+                // From here `dz` holds the second-order term until the step is recovered.
+                row.dz[i] = row.ds[i] * row.dz[i] - target;
+            }
+            let y = times(&row.dz, &row.inverse_s);
+            let (yp, yb, yu, ye) = gather(&y);
+            let bend = 0.5 * sub.phi1[k] * y[1];
+            let share_u = part.w5 * part.inverse_u * yu;
+            let on_b = yp + yb + share_u;
+            part.right_u += yu;
+            part.right_b += on_b;
+            let share_b = part.inverse_b * on_b;
+            let on_p = yp + share_u;
+            self.base[k] += sub.a1[k] * on_p - bend + ye - part.x1 * share_b;
+            if k > 0 {
+                self.base[k - 1] += sub.a0[k] * on_p - bend - part.x0 * share_b;
+            }
+        }
+        if let Some(row) = &mut self.time {
+            row.rc = row.s * row.z + row.ds * row.dz - target;
+            let pull = (row.ds * row.dz - target) / row.s;
+            for (r, t) in self.base.iter_mut().zip(&self.t) {
+                *r += t * pull;
+            }
+        }
+        if let Some(end) = &mut self.soft {
+            for r in [&mut end.own, &mut end.spare] {
+                r.rc = r.s * r.z + r.ds * r.dz - target;
+            }
+            let own = (end.own.ds * end.own.dz - target) / end.own.s;
+            let spare = (end.spare.ds * end.spare.dz - target) / end.spare.s;
+            let (w7, w8) = (end.own.weight(), end.spare.weight());
+            end.right -= own + spare;
+            self.base[n - 1] += -spare + w8 / (w7 + w8) * (own + spare);
+        }
+        if fixed {
+            self.base[n - 1] = 0.0;
+        }
+        self.de.copy_from_slice(&self.base);
+        self.band.solve(&mut self.de);
+        self.border();
+        let mut worst = 0.0f64;
+        let mut before = 0.0;
+        for k in 0..n {
+            let (part, row) = (&self.parts[k], &mut self.rows[k]);
+            let de = self.de[k];
+            let (db, du, step) = part.recover(sub, k, before, de);
+            self.db[k] = db;
+            self.du[k] = du;
+            for (i, step) in step.into_iter().enumerate() {
+                let ds = -row.rp[i] - step;
+                let dz = -row.z[i] - (row.z[i] * ds + row.dz[i]) * row.inverse_s[i];
+                row.ds[i] = ds;
+                row.dz[i] = dz;
+                let (of_s, of_z) = (-ds * row.inverse_s[i], -dz / row.z[i]);
+                let ratio = if of_s > of_z { of_s } else { of_z };
+                worst = if ratio > worst { ratio } else { worst };
+            }
+            before = de;
+        }
+        self.scalar_steps(|r| r.rc);
+        self.scalars(|r| worst = worst.max(-r.ds / r.s).max(-r.dz / r.z));
+        1.0 / worst.max(1e-12)
+    }
+
+    /// The dense time row by one Schur complement.
+    fn border(&mut self) {
+        if let Some(row) = &self.time {
+            let along = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            let y = along(&self.t, &self.de) / (1.0 / row.weight() + along(&self.t, &self.mt));
+            for (d, m) in self.de.iter_mut().zip(&self.mt) {
+                *d -= y * m;
+            }
+        }
+    }
+
+    /// Steps of the inequalities outside the intervals, for the complementarity `rc`.
+    fn scalar_steps(&mut self, rc: impl Fn(&super::Scalar) -> f64) {
+        if let Some(row) = &mut self.time {
+            let c_dx = self.t.iter().zip(&self.de).map(|(a, b)| a * b).sum();
+            let rc = rc(row);
+            row.direct(c_dx, rc);
+        }
+        if let Some(end) = &mut self.soft {
+            let last = self.de[self.de.len() - 1];
+            let (w7, w8) = (end.own.weight(), end.spare.weight());
+            end.step = (end.right - w8 * last) / (w7 + w8);
+            let (own, spare) = (rc(&end.own), rc(&end.spare));
+            end.own.direct(-end.step, own);
+            end.spare.direct(-end.step - last, spare);
+        }
+    }
+}
+
+impl Eliminated {
+    /// Brake, `u` and `C dx` of an interval from the steps of its energies.
+    #[inline]
+    fn recover(&self, sub: &Subproblem, k: usize, before: f64, de: f64) -> (f64, f64, [f64; ROWS]) {
+        let db = (self.right_b - self.x1 * de - self.x0 * before) * self.inverse_b;
+        let dp = sub.a0[k] * before + sub.a1[k] * de + db;
+        let du = (self.right_u + self.w5 * dp) * self.inverse_u;
+        let bend = 0.5 * sub.phi1[k] * (before + de);
+        (db, du, [-dp, dp - bend, db, -db, du, du - dp, de, -de])
+    }
+}
