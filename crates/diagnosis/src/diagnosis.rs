@@ -7,6 +7,7 @@ use crate::gain::{DriveError, HORIZON_S, drive_error, rms};
 use crate::hypothesis::{CATALOGUE, CauseKind};
 use crate::problem::{Problem, Reference};
 use crate::replay::{Module, Prepared};
+use crate::report_models::Models;
 use crate::search::Fit;
 use crate::sentence;
 use crate::unknown::Shape;
@@ -161,6 +162,9 @@ pub struct Diagnosis {
     pub tolerances_from_baseline: bool,
     /// Defects of the data.
     pub findings: Vec<Finding>,
+    /// The models that were compared.
+    #[serde(skip)]
+    pub models: Models,
 }
 
 /// Choices of the caller.
@@ -254,6 +258,11 @@ pub fn diagnose(
     } else {
         Verdict::Explained
     };
+    let models = Models {
+        before: problem.reference.theta,
+        after: fit.theta,
+        sigma: Module::ALL.map(|m| problem.reference.whiteners[m as usize].sigma),
+    };
     progress(Progress::Gain);
     let held = prepare(&held);
     let gain = (!held.is_empty() && !fit.set.is_empty())
@@ -274,6 +283,7 @@ pub fn diagnose(
         extended_truck,
         tolerances_from_baseline: baseline.is_some(),
         findings: drives.findings.clone(),
+        models,
     })
 }
 

@@ -20,6 +20,8 @@ pub(crate) enum Command {
     Run(Box<cmd::run::Args>),
     /// Plans the fuel-optimal speed of a whole trip, against cruise control.
     Plan(Box<cmd::plan::Args>),
+    /// Finds what the simulation gets wrong on measured drives, and why.
+    Diagnose(Box<cmd::diagnose::Args>),
     /// Checks road maps.
     #[command(subcommand)]
     Map(cmd::map::Command),

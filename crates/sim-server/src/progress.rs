@@ -35,3 +35,28 @@ impl Progress {
         self.0.finish_and_clear();
     }
 }
+
+/// A line that says what is being done, on a terminal.
+pub(crate) struct Stages(ProgressBar);
+
+impl Stages {
+    /// A spinner on stderr, if that is a terminal.
+    pub(crate) fn start() -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(5));
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed:>4}  {msg}") {
+            bar.set_style(style);
+        }
+        bar.enable_steady_tick(std::time::Duration::from_millis(200));
+        Self(bar)
+    }
+
+    /// What is being done now.
+    pub(crate) fn show(&self, what: &str) {
+        self.0.set_message(what.to_owned());
+    }
+
+    /// Removes the line.
+    pub(crate) fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}

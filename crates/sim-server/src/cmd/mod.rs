@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub(crate) mod diagnose;
 pub(crate) mod map;
 pub(crate) mod plan;
 pub(crate) mod recover;
@@ -17,6 +18,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         None => run::run(&run::Args::parse_from(["run"])),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Plan(args)) => plan::run(&args),
+        Some(Command::Diagnose(args)) => diagnose::run(&args),
         Some(Command::Map(command)) => map::run(command),
         Some(Command::Recover(args)) => recover::run(&args),
         Some(Command::Scenario(command)) => scenario::run(&command),

@@ -1,0 +1,352 @@
+//! The extended truck: what was found, as an overlay on the truck file that the simulator, the
+//! planner and the server load.
+//!
+//! The diagnosis fits sizes in the terms of its replay (a factor on the coefficient, kilowatts of
+//! a fan, seconds of a delay); the truck file has figures. This table says which figure carries
+//! which size. Prior bounds are those of [`dynamics::catalogue::CATALOGUE`]; a value beyond what the
+//! catalogue considers is limited to it and says so in its source.
+//!
+//! Left out: derating by coolant temperature, which no figure of the truck file carries; such
+//! parameters come back in [`Extension::not_carried`].
+
+use std::collections::BTreeMap;
+
+use dynamics::{Overlay, OverlayValue, TruckParameters};
+use tractrix_core::RPM_PER_RAD_S;
+
+use crate::{Cause, NotObservable};
+
+/// An overlay and what could not go into it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extension {
+    /// The overlay; none if no figure of the truck file carries what was found.
+    pub overlay: Option<Overlay>,
+    /// Causes that the truck file cannot carry, and why.
+    pub not_carried: Vec<NotObservable>,
+}
+
+/// 0 °C in K.
+const ZERO_DEGC_K: f64 = 273.15;
+/// Thresholds and time constants from which the replay counts its shape parameters.
+const FAN_FROM_DEGC: f64 = 97.0;
+const FADE_FROM_DEGC: f64 = 150.0;
+const ALTITUDE_FROM_M: f64 = 1_500.0;
+const AIR_FROM_DEGC: f64 = 30.0;
+const WARMUP_S: f64 = 1_800.0;
+/// Load below which the replay's low-load consumption acts, of full load.
+const LOW_LOAD_FRAC: f64 = 0.3;
+/// Engine speed at which a load is turned into a power, rpm: where highway trucks cruise.
+const CRUISE_RPM: f64 = 1_250.0;
+/// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
+const RETARDER_POWER_W: f64 = 400_000.0;
+
+/// How a fitted parameter becomes a figure of the truck file.
+enum Carry {
+    /// `figure * value`.
+    Times(&'static str),
+    /// `figure + factor * value`.
+    Plus(&'static str, f64),
+    /// `a + factor * value`, whatever the figure was.
+    From(&'static str, f64, f64),
+    /// `a * exp(value)`, whatever the figure was.
+    Exp(&'static str, f64),
+    /// Share of the driveline's power that is lost on top.
+    Loss,
+    /// Seconds on top of the three phases of a shift.
+    Shift,
+    /// Load below which consumption rises, as a power.
+    LowLoad,
+    /// Torque per stage of a retarder.
+    Retarder,
+    /// Force per brake demand.
+    BrakeDemand,
+    /// Nothing carries it.
+    Nowhere(&'static str),
+}
+
+fn carry(id: &str, key: &str) -> Option<Carry> {
+    use Carry::{Exp, From, Nowhere, Plus, Times};
+    Some(match (id, key) {
+        ("rolling_resistance", "coefficient_scale") => Times("resistance.rolling_coeff"),
+        ("air_drag", "cd_a_scale") => Times("resistance.drag_area_m2"),
+        ("headwind", "headwind_m_s") => Plus("resistance.headwind_m_s", 1.0),
+        ("wind", "wind_to_x_m_s") => Plus("resistance.wind_to_x_m_s", 1.0),
+        ("wind", "wind_to_y_m_s") => Plus("resistance.wind_to_y_m_s", 1.0),
+        ("mass", "mass_scale") => Times("instruments.mass_scale_coeff"),
+        ("grade_bias", "grade_frac") => Plus("instruments.grade_bias_frac", 1.0),
+        ("map_shift", "shift_m") => Plus("instruments.map_shift_m", 1.0),
+        ("tyre_warmup", "cold_extra_frac") => Plus("resistance.cold_tyre_extra_frac", 1.0),
+        ("tyre_warmup", "ln_time_constant") => Exp("resistance.tyre_warmup_s", WARMUP_S),
+        ("driveline_loss", "extra_loss_frac") => Carry::Loss,
+        ("fan_load", "fan_power_kw") => Plus("engine.fan_power_w", 1e3),
+        ("fan_load", "coolant_start_offset_k") => {
+            From("engine.fan_on_k", ZERO_DEGC_K + FAN_FROM_DEGC, 1.0)
+        }
+        ("dragging_brake", "force_n") => Plus("resistance.parasitic_force_n", 1.0),
+        ("engine_friction", "friction_scale") => Times("engine.friction_scale_coeff"),
+        ("altitude_derate", "torque_loss_per_km") => Plus("engine.derate_altitude_1_m", 1e-3),
+        ("altitude_derate", "start_offset_m") => {
+            From("engine.derate_altitude_m", ALTITUDE_FROM_M, 1.0)
+        }
+        ("heat_derate", "torque_loss_per_10_k_air") => Plus("engine.derate_air_1_k", 0.1),
+        ("heat_derate", "air_start_offset_k") => {
+            From("engine.derate_air_k", ZERO_DEGC_K + AIR_FROM_DEGC, 1.0)
+        }
+        ("heat_derate", "torque_loss_per_10_k_coolant" | "coolant_start_offset_k") => {
+            Nowhere("the truck file has no derating by coolant temperature")
+        }
+        ("turbo_lag", "lag_s") => Plus("engine.slow_lag_s", 1.0),
+        ("pedal_delay", "delay_s") => Plus("engine.pedal_delay_s", 1.0),
+        ("shift_duration", "extra_time_s") => Carry::Shift,
+        ("fuel_map_low_load", "extra_frac") => Plus("engine.fuel.low_load_extra_frac", 1.0),
+        ("fuel_map_low_load", "ln_load") => Carry::LowLoad,
+        ("brake_gain", "gain_scale") => Times("brake.gain_scale_coeff"),
+        ("brake_fade", "loss_per_100_k") => Plus("brake.fade_1_k", 0.01),
+        ("brake_fade", "start_offset_k") => {
+            From("brake.fade_from_k", ZERO_DEGC_K + FADE_FROM_DEGC, 1.0)
+        }
+        ("brake_delay", "delay_s") => Plus("brake.dead_time_s", 1.0),
+        ("hidden_retarder", "torque_per_stage_nm") => Carry::Retarder,
+        ("hidden_retarder", "force_n_per_m_s2") => Carry::BrakeDemand,
+        ("hidden_retarder", "torque_nm") => Plus("driveline.hidden_retarder_torque_nm", 1.0),
+        ("speed_scale", "scale") => Times("instruments.speed_scale_coeff"),
+        ("yaw_rate_bias", "bias_rad_s") => Plus("instruments.yaw_rate_bias_rad_s", 1.0),
+        ("steering_ratio", "ratio_scale") => Times("lateral.steering.ratio"),
+        ("steering_offset", "offset_rad") => Plus("lateral.steering.offset_rad", 1.0),
+        ("steering_free_play", "free_play_rad") => Plus("lateral.steering.free_play_rad", 1.0),
+        ("steering_lag", "lag_s") => Plus("lateral.steering.lag_s", 1.0),
+        ("cornering_stiffness_front", "stiffness_scale") => {
+            Times("lateral.tyres.stiffness_scale[0]")
+        }
+        ("cornering_stiffness_drive", "stiffness_scale") => {
+            Times("lateral.tyres.stiffness_scale[1]")
+        }
+        ("cornering_stiffness_trailer", "stiffness_scale") => {
+            Times("lateral.tyres.stiffness_scale[2]")
+        }
+        ("payload_position", "shift_rearward_m") => Plus("lateral.payload.cg_behind_hitch_m", 1.0),
+        ("road_bank", "bank_rad") => Plus("instruments.bank_offset_rad", 1.0),
+        ("crosswind", "wind_to_left_m_s") => Plus("resistance.crosswind_to_left_m_s", 1.0),
+        _ => return None,
+    })
+}
+
+/// A figure of the truck file with its standard deviation.
+struct Figure {
+    path: &'static str,
+    value: f64,
+    sigma: f64,
+}
+
+impl Carry {
+    /// Figures that carry a fitted value, given the truck's present figures.
+    fn figures(&self, truck: &TruckParameters, value: f64, sigma: f64) -> Vec<Figure> {
+        let now = |path| truck.parameter(path).unwrap_or(f64::NAN);
+        let one = |path, value, sigma: f64| vec![Figure { path, value, sigma: sigma.abs() }];
+        match *self {
+            Self::Times(path) => one(path, now(path) * value, now(path) * sigma),
+            Self::Plus(path, k) => one(path, now(path) + k * value, k * sigma),
+            Self::From(path, a, k) => one(path, a + k * value, k * sigma),
+            Self::Exp(path, a) => one(path, a * value.exp(), a * value.exp() * sigma),
+            Self::Loss => {
+                let d = &truck.driveline;
+                let nominal = 1.0 - d.gearbox_efficiency_frac * d.axle_efficiency_frac;
+                let per_loss = d.efficiency_frac() / nominal.max(1e-6);
+                let path = "driveline.loss_scale_coeff";
+                one(path, now(path) + per_loss * value, per_loss * sigma)
+            }
+            Self::Shift => {
+                let s = &truck.shift;
+                let length_s = (s.ramp_down_s + s.open_s + s.ramp_up_s).max(1e-6);
+                let path = "shift.duration_scale_coeff";
+                one(path, now(path) + value / length_s, sigma / length_s)
+            }
+            Self::LowLoad => {
+                let power_kw = LOW_LOAD_FRAC * value.exp() * full_load_nm(truck, CRUISE_RPM)
+                    / RPM_PER_RAD_S
+                    * CRUISE_RPM
+                    * 1e-3;
+                one("engine.fuel.low_load_kw", power_kw, power_kw * sigma)
+            }
+            Self::Retarder => {
+                let (torque, power) =
+                    ("driveline.retarder_torque_nm", "driveline.retarder_power_w");
+                let mut out = one(torque, now(torque) + value, sigma);
+                out.extend(one(power, now(power).max(RETARDER_POWER_W), 0.0));
+                out
+            }
+            Self::BrakeDemand => {
+                let per_mass = 1.0 / truck.lateral.total_mass_kg();
+                let path = "brake.gain_scale_coeff";
+                one(path, now(path) * (1.0 + value * per_mass), now(path) * sigma * per_mass)
+            }
+            Self::Nowhere(_) => Vec::new(),
+        }
+    }
+}
+
+fn full_load_nm(truck: &TruckParameters, rpm: f64) -> f64 {
+    let e = &truck.engine;
+    tractrix_core::Curve::new(
+        "full_load_torque_nm",
+        e.full_load_speed_rpm.clone(),
+        e.full_load_torque_nm.clone(),
+    )
+    .map_or(0.0, |c| c.at(rpm))
+}
+
+/// The truck with the causes that were found, as an overlay named `name` on `base` (a built-in
+/// name, or a file beside the overlay). `origin` says where the figures come from.
+///
+/// A cause that makes the truck file unusable (a figure outside what the simulator takes) is left
+/// out and comes back as not carried.
+#[must_use]
+pub fn extend(
+    truck: &TruckParameters,
+    base: &str,
+    name: &str,
+    causes: &[Cause],
+    origin: &str,
+) -> Extension {
+    let mut extended = truck.clone();
+    let mut set = BTreeMap::new();
+    let mut not_carried = Vec::new();
+    for cause in causes {
+        match carried(&extended, cause, origin) {
+            Ok((values, next)) => {
+                set.extend(values);
+                extended = next;
+            }
+            Err(why) => not_carried.push(NotObservable { id: cause.id, why }),
+        }
+    }
+    let overlay = (!set.is_empty()).then(|| Overlay {
+        schema: 1,
+        base: base.to_owned(),
+        name: name.to_owned(),
+        set,
+    });
+    Extension { overlay, not_carried }
+}
+
+type Values = BTreeMap<String, OverlayValue>;
+
+/// The figures of one cause, and the truck with them.
+fn carried(
+    truck: &TruckParameters,
+    cause: &Cause,
+    origin: &str,
+) -> Result<(Values, TruckParameters), String> {
+    let mut set = Values::new();
+    for (key, p) in &cause.parameters {
+        let carry =
+            carry(cause.id, key).ok_or_else(|| format!("no figure carries its parameter {key}"))?;
+        if let Carry::Nowhere(why) = carry {
+            return Err(why.to_owned());
+        }
+        for figure in carry.figures(truck, p.value, p.sigma) {
+            let bounds = bounds(truck, cause.id, figure.path);
+            let mut source = format!("{origin}: {} = {:.6} {}", cause.id, p.value, p.unit);
+            let mut value = figure.value;
+            if let Some([low, high]) = bounds
+                && !(low..=high).contains(&value)
+            {
+                source += &format!(", limited from {value:.6} to what the catalogue considers");
+                value = value.clamp(low, high);
+            }
+            let sigma = (figure.sigma > 0.0).then_some(figure.sigma);
+            set.insert(figure.path.to_owned(), OverlayValue { value, sigma, bounds, source });
+        }
+    }
+    let overlay = Overlay { schema: 1, base: String::new(), name: truck.name.clone(), set };
+    let next = truck.with_overlay(&overlay).map_err(|e| e.to_string())?;
+    Ok((overlay.set, next))
+}
+
+/// Bounds that the catalogue gives a figure of a cause.
+fn bounds(truck: &TruckParameters, id: &str, path: &str) -> Option<[f64; 2]> {
+    let p = dynamics::catalogue::cause(id)?.parameters().find(|p| p.path == path)?;
+    let nominal = truck.parameter(path)?;
+    Some(p.bounds.map(|b| p.value(nominal, b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Parameter;
+    use crate::hypothesis::CATALOGUE;
+
+    fn cause(id: &'static str, parameters: &[(&'static str, f64, f64)]) -> Cause {
+        Cause {
+            id,
+            kind: crate::CauseKind::Value,
+            sentence: String::new(),
+            parameters: parameters
+                .iter()
+                .map(|(k, value, sigma)| {
+                    (*k, Parameter { value: *value, sigma: *sigma, unit: "1" })
+                })
+                .collect(),
+            evidence: 40.0,
+            confused_with: Vec::new(),
+        }
+    }
+
+    fn one(c: Cause) -> Values {
+        let truck = TruckParameters::load("reference").unwrap();
+        extend(&truck, "reference", "x", &[c], "test").overlay.unwrap().set
+    }
+
+    #[test]
+    fn every_parameter_of_every_hypothesis_has_a_place_or_says_that_it_has_none() {
+        let truck = TruckParameters::load("reference").unwrap();
+        for h in CATALOGUE {
+            for p in h.params() {
+                let carry = carry(h.id, p.spec().key)
+                    .unwrap_or_else(|| panic!("{}: {} is not carried", h.id, p.spec().key));
+                for f in carry.figures(&truck, 0.1, 0.01) {
+                    assert!(truck.parameter(f.path).is_some(), "{}", f.path);
+                    assert!(f.value.is_finite() && f.sigma.is_finite(), "{}", f.path);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_become_figures_with_their_deviation_and_bounds() {
+        let set = one(cause("rolling_resistance", &[("coefficient_scale", 1.17, 0.02)]));
+        let v = &set["resistance.rolling_coeff"];
+        assert!((v.value - 1.17 * 0.0062).abs() < 1e-12);
+        assert!((v.sigma.unwrap() - 0.02 * 0.0062).abs() < 1e-12);
+        assert!(v.bounds.unwrap()[0] < v.value && v.value < v.bounds.unwrap()[1]);
+        let set = one(cause("driveline_loss", &[("extra_loss_frac", 0.03, 0.001)]));
+        let truck = TruckParameters::load("reference").unwrap();
+        let with = truck
+            .with_parameter("driveline.loss_scale_coeff", set["driveline.loss_scale_coeff"].value)
+            .unwrap();
+        let expected = truck.driveline.efficiency_frac() * 0.97;
+        assert!((with.driveline.efficiency_frac() - expected).abs() < 1e-12);
+        let set = one(cause("shift_duration", &[("extra_time_s", 0.4, 0.02)]));
+        assert!((set["shift.duration_scale_coeff"].value - 1.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_size_beyond_what_the_simulator_takes_is_limited_and_says_so() {
+        let set = one(cause("brake_delay", &[("delay_s", 1.4, 0.02)]));
+        let v = &set["brake.dead_time_s"];
+        assert!(v.value < 0.64 && v.source.contains("limited from 1.65"), "{v:?}");
+    }
+
+    #[test]
+    fn a_cause_without_a_figure_is_not_lost_silently() {
+        let truck = TruckParameters::load("reference").unwrap();
+        let found = [
+            cause("heat_derate", &[("torque_loss_per_10_k_coolant", 0.1, 0.01)]),
+            cause("mass", &[("mass_scale", 0.92, 0.004)]),
+        ];
+        let e = extend(&truck, "reference", "x", &found, "test");
+        assert_eq!(e.not_carried.len(), 1);
+        assert_eq!(e.not_carried[0].id, "heat_derate");
+        assert_eq!(e.overlay.unwrap().set.len(), 1);
+    }
+}
