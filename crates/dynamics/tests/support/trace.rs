@@ -28,9 +28,6 @@ pub(crate) fn replay(
     path: &Path,
     mass_kg: f64,
 ) -> Result<Agreement, Box<dyn std::error::Error>> {
-    let parameters = TruckParameters::load(truck)?;
-    let empty_kg = TruckModel::new(parameters.clone(), 0.0)?.mass_kg();
-    let model = TruckModel::new(parameters, mass_kg - empty_kg)?;
     let mut reader = csv::Reader::from_path(path)?;
     let header = reader.headers()?.clone();
     let column = |name: &str| {
@@ -57,6 +54,18 @@ pub(crate) fn replay(
         }
         rows.push(row);
     }
+    compare(truck, &rows, mass_kg)
+}
+
+/// Drives the truck with the inputs of a trace's rows and compares.
+pub(crate) fn compare(
+    truck: &str,
+    rows: &[[f64; 9]],
+    mass_kg: f64,
+) -> Result<Agreement, Box<dyn std::error::Error>> {
+    let parameters = TruckParameters::load(truck)?;
+    let empty_kg = TruckModel::new(parameters.clone(), 0.0)?.mass_kg();
+    let model = TruckModel::new(parameters, mass_kg - empty_kg)?;
     let first = rows.first().ok_or("an empty trace")?;
     let mut state = model.initial_state(0.0, 0.0, 0.0, first[8] / 3.6);
     let (mut error, mut size, mut same, mut steady) = (0.0, 0.0, 0.0, 0.0_f64);
