@@ -127,10 +127,11 @@ impl ReleasedModel {
         for k in 0..=(m.duration_s / STEP_S) as usize {
             let t = k as f64 * STEP_S;
             let (kmh, rpm) = (3.6 * v, win * 9.549_296_585_513_721);
-            if let Some((_, from)) = m.brake {
-                if coast_from.is_none() && kmh >= from {
-                    coast_from = Some(t);
-                }
+            if let Some((_, from)) = m.brake
+                && coast_from.is_none()
+                && kmh >= from
+            {
+                coast_from = Some(t);
             }
             let braking = coast_from.is_some_and(|from| t >= from + 17.0);
             let pedal = if coast_from.is_some() { 0.0 } else { m.pedal_pct };
