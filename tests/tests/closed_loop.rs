@@ -1,5 +1,9 @@
 //! The main job without its server: 15 km, 55 t, closed loop on the built-in highway.
 
+use std::sync::Arc;
+
+use dynamics::{TruckModel, TruckParameters};
+use road::Road;
 use sim::{MemoryRecorder, Scenario, Status, World};
 
 fn world(name: &str, seed: u64) -> World {
@@ -64,4 +68,24 @@ fn the_recorder_sees_every_tick_in_order() {
     World::new(&scenario, 1).unwrap().run(&mut recorder).unwrap();
     assert_eq!(recorder.records.len(), 500);
     assert!(recorder.records.windows(2).all(|w| w[1].time.0 - w[0].time.0 == 10_000_000));
+}
+
+/// Instrument faults of a truck file stood in the file and did nothing in the closed loop.
+#[test]
+fn a_speedometer_that_reads_five_percent_high_makes_the_truck_slower() {
+    let mut scenario = Scenario::builtin("flat").unwrap();
+    scenario.run.duration_s = 120.0;
+    let drive = |speed_scale: f64| {
+        let truck = TruckParameters::load(&scenario.truck.file)
+            .unwrap()
+            .with_parameter("instruments.speed_scale_coeff", speed_scale)
+            .unwrap();
+        let model = Arc::new(TruckModel::new(truck, scenario.truck.payload_kg).unwrap());
+        let road = Arc::new(Road::load(&scenario.road).unwrap());
+        let mut world = World::assemble(&scenario, 1, road, model).unwrap();
+        world.run(&mut ()).unwrap();
+        world.truck().state().speed_m_s
+    };
+    let ratio = drive(1.05) / drive(1.0);
+    assert!((ratio - 1.0 / 1.05).abs() < 0.003, "{ratio}");
 }

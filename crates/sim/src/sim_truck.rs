@@ -77,7 +77,7 @@ impl SimTruck {
         Ok(truck)
     }
 
-    /// The state read last.
+    /// The true state read last; [`Vehicle::ego`] gives what the instruments make of it.
     #[must_use]
     pub const fn state(&self) -> &EgoState {
         &self.ego
@@ -95,9 +95,10 @@ impl SimTruck {
         &self.model
     }
 
-    /// Road and weather where the truck is.
+    /// Road (as the map has it for where the truck is) and weather.
     fn patch(&self) -> RoadPatch {
-        let at = self.road.at(self.ego.s_m, self.ego.d_m);
+        let mapped_m = self.model.parameters().instruments.map_position_m(self.ego.s_m);
+        let at = self.road.at(mapped_m, self.ego.d_m);
         let start_z = self.road.at(0.0, 0.0).z_m;
         let climbed = at.z_m - start_z;
         let w = &self.weather;
@@ -136,7 +137,7 @@ impl Vehicle for SimTruck {
             self.time = self.time.plus_nanos(Time::from_seconds(steps * SUBSTEP_S).0);
             self.observe();
         }
-        Ok(Stamped { time: self.time, value: self.ego })
+        Ok(Stamped { time: self.time, value: self.model.measured(&self.ego) })
     }
 
     fn command(&mut self, _now: Time, command: &Command) -> Result<(), DynamicsError> {
