@@ -14,13 +14,17 @@ mod metrics;
 mod scenario;
 mod sim_truck;
 mod traffic;
+mod traffic_section;
 mod world;
 
 pub use collision::{Footprint, footprints_overlap};
 pub use error::SimError;
 pub use memory::{MemoryRecord, MemoryRecorder};
 pub use metrics::{Metrics, Summary};
-pub use scenario::{EgoStart, RunLimits, Scenario, TrafficSection, TruckSection, Weather};
+pub use scenario::{EgoStart, RunLimits, Scenario, TruckSection, Weather};
 pub use sim_truck::SimTruck;
-pub use traffic::Traffic;
+pub use traffic::{Traffic, read_manifest, recording_of};
+pub use traffic_section::{
+    Family, OnFailure, ReplaySection, SumoSection, SumoTimeouts, TrafficKind, TrafficSection,
+};
 pub use world::{Status, World};

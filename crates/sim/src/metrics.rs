@@ -1,6 +1,6 @@
 //! What a run is measured by: the keys of `summary.json`.
 
-use std::collections::VecDeque;
+use std::collections::{HashSet, VecDeque};
 
 use planner::rss::{RearResponse, RssConfig, SafeGap};
 use road::Road;
@@ -38,6 +38,8 @@ pub struct Summary {
     pub max_lateral_error_m: f64,
     /// Largest distance of the trailer's axle-group centre from the path planned there, m.
     pub max_trailer_lateral_error_m: f64,
+    /// Other vehicles that have been around the ego.
+    pub vehicles_met: usize,
     /// Ticks in which the guard changed the command.
     pub guard_activations: u64,
     /// Hash over every bit of every ego state of the run (FNV-1a, 64 bit, hexadecimal).
@@ -63,6 +65,7 @@ pub struct Metrics {
     lane_changes: u32,
     last_maneuver: Maneuver,
     touching: Vec<u64>,
+    met: HashSet<u64>,
     collisions: u32,
     min_ttc_s: f64,
     rss_below: bool,
@@ -95,6 +98,7 @@ impl Metrics {
             lane_changes: 0,
             last_maneuver: Maneuver::KeepLane,
             touching: Vec::new(),
+            met: HashSet::new(),
             collisions: 0,
             min_ttc_s: f64::INFINITY,
             rss_below: false,
@@ -125,6 +129,7 @@ impl Metrics {
             delta_speed_frac: self.delta_sum / (self.ticks.max(1) as f64),
             max_lateral_error_m: self.max_lateral_error_m,
             max_trailer_lateral_error_m: self.max_trailer_lateral_error_m,
+            vehicles_met: self.met.len(),
             guard_activations: self.guard_activations,
             state_hash: format!("{:016x}", self.hash),
         }
@@ -270,6 +275,7 @@ impl Recorder for Metrics {
         self.last_maneuver = maneuver;
         self.max_lateral_error_m = self.max_lateral_error_m.max(tick.plan.lateral_error_m.abs());
         self.guard_activations += u64::from(!tick.plan.guard.is_empty());
+        self.met.extend(tick.scene.neighbours.iter().map(|n| n.id));
         self.count_collisions(tick);
         self.watch_headway(tick);
         self.watch_trailer(tick);

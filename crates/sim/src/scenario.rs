@@ -3,16 +3,24 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use traffic_client::native::TrafficConfig;
 
-use crate::SimError;
+use crate::{SimError, TrafficSection};
+
+/// Speed limit of a road under a recording, m/s (120 km/h).
+const RECORDED_LIMIT_M_S: f64 = 33.33;
 
 /// Built-in scenarios: name and text.
-const BUILTIN: [(&str, &str); 4] = [
+const BUILTIN: [(&str, &str); 10] = [
     ("highway", include_str!("../scenarios/highway.toml")),
     ("highway-empty", include_str!("../scenarios/highway-empty.toml")),
     ("test-site", include_str!("../scenarios/test-site.toml")),
     ("flat", include_str!("../scenarios/flat.toml")),
+    ("dense-12.5", include_str!("../scenarios/dense-12.5.toml")),
+    ("dense-15", include_str!("../scenarios/dense-15.toml")),
+    ("medium-12.5", include_str!("../scenarios/medium-12.5.toml")),
+    ("medium-15", include_str!("../scenarios/medium-15.toml")),
+    ("sparse-12.5", include_str!("../scenarios/sparse-12.5.toml")),
+    ("sparse-15", include_str!("../scenarios/sparse-15.toml")),
 ];
 
 /// A scenario. Unknown keys are refused.
@@ -73,29 +81,6 @@ impl Default for EgoStart {
     fn default() -> Self {
         Self { s_m: 30.0, lane: None, speed_m_s: 20.0 }
     }
-}
-
-/// Which traffic, and its figures.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrafficSection {
-    /// The source: `native` or `none`.
-    #[serde(default)]
-    pub source: TrafficKind,
-    /// Figures of the native engine.
-    #[serde(default)]
-    pub native: TrafficConfig,
-}
-
-/// A traffic source by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum TrafficKind {
-    /// The native IDM+MOBIL engine.
-    #[default]
-    Native,
-    /// An empty road.
-    None,
 }
 
 /// Weather along the whole road.
@@ -200,6 +185,24 @@ impl Scenario {
         if wrong.is_empty() { Ok(scenario) } else { Err(bad(wrong.join("; "))) }
     }
 
+    /// The road that the scenario names; `recording:LANES` lays one with that many lanes under the
+    /// scenario's recording.
+    ///
+    /// # Errors
+    /// [`SimError`] names the road or recording that cannot be used.
+    pub fn load_road(&self) -> Result<road::Road, SimError> {
+        let Some(lanes) = self.road.strip_prefix("recording:") else {
+            return Ok(road::Road::load(&self.road)?);
+        };
+        let lanes = lanes.parse().map_err(|_| SimError::Scenario {
+            name: self.name.clone(),
+            why: format!("road = {:?}: the number of lanes is missing", self.road),
+        })?;
+        let recording = crate::traffic::recording_of(self)?;
+        traffic_client::replay::road_of(&recording, lanes, RECORDED_LIMIT_M_S)
+            .map_err(|e| traffic_client::TrafficError::from(e).into())
+    }
+
     /// Files named by a scenario lie beside it unless their path is absolute.
     fn resolve_paths(&mut self, folder: &Path) {
         for file in [&mut self.road, &mut self.truck.file] {
@@ -207,9 +210,13 @@ impl Scenario {
                 *file = folder.join(&*file).display().to_string();
             }
         }
+        self.traffic.resolve_paths(folder);
     }
 
-    fn violations(&self) -> Vec<String> {
+    /// Everything that cannot be, each with its key; empty for a sound scenario. Whoever changes a
+    /// scenario after reading it asks again.
+    #[must_use]
+    pub fn violations(&self) -> Vec<String> {
         let mut wrong = Vec::new();
         if self.schema != 1 {
             wrong.push(format!("schema = {}, this program reads 1", self.schema));
@@ -230,6 +237,7 @@ impl Scenario {
                 wrong.push(format!("{key} = {value} is outside {low} to {high}"));
             }
         }
+        wrong.extend(self.traffic.violations());
         wrong
     }
 }

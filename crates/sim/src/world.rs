@@ -1,14 +1,13 @@
 //! One world: road, truck, traffic, stack and metrics, moved tick by tick.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use dynamics::{TruckModel, TruckParameters};
 use planner::{RatesConfig, Stack, StackConfig};
 use road::Road;
-use tractrix_core::{Geometry, Recorder, Scene, Time, Vehicle};
-use traffic_client::native::{NativeTraffic, TrafficConfig};
+use tractrix_core::{EgoState, Geometry, Plan, Recorder, Tick, Time, Vehicle};
 
-use crate::scenario::TrafficKind;
 use crate::{Metrics, Scenario, SimError, SimTruck, Summary, Traffic};
 
 /// Whether a run goes on.
@@ -23,7 +22,8 @@ pub enum Status {
     TimeOver,
 }
 
-/// The closed loop. `Clone` is a snapshot: a clone continues bit for bit like its original.
+/// The closed loop. `Clone` is a snapshot: a clone continues bit for bit like its original. (Not in
+/// SUMO traffic: there is one SUMO, and the clone's next tick is an error that says so.)
 #[derive(Clone)]
 pub struct World {
     scenario: Scenario,
@@ -35,6 +35,26 @@ pub struct World {
     now: Time,
     tick_ns: i64,
     status: Status,
+    /// Sensors change what the stack sees of the traffic.
+    sensors: bool,
+}
+
+/// Measures a tick. Where sensors change the scene, the tick is kept and measured with the scene as
+/// it is: what a truck does not see it can still hit.
+struct Judge<'a> {
+    metrics: &'a mut Metrics,
+    unseen: Option<(EgoState, Plan)>,
+    sensors: bool,
+}
+
+impl Recorder for Judge<'_> {
+    fn record(&mut self, tick: &Tick<'_>) {
+        if self.sensors {
+            self.unseen = Some((*tick.ego, tick.plan.clone()));
+        } else {
+            self.metrics.record(tick);
+        }
+    }
 }
 
 impl World {
@@ -43,10 +63,23 @@ impl World {
     /// # Errors
     /// [`SimError`] names the road, truck file, key or value that cannot be used.
     pub fn new(scenario: &Scenario, seed: u64) -> Result<Self, SimError> {
-        let road = Arc::new(Road::load(&scenario.road)?);
+        Self::build(scenario, seed, None)
+    }
+
+    /// As [`Self::new`]; the working files of a traffic program (SUMO) go into `folder`, which is
+    /// made when it is needed.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn in_folder(scenario: &Scenario, seed: u64, folder: &Path) -> Result<Self, SimError> {
+        Self::build(scenario, seed, Some(folder))
+    }
+
+    fn build(scenario: &Scenario, seed: u64, folder: Option<&Path>) -> Result<Self, SimError> {
+        let road = Arc::new(scenario.load_road()?);
         let params = TruckParameters::load(&scenario.truck.file)?;
         let model = Arc::new(TruckModel::new(params, scenario.truck.payload_kg)?);
-        Self::assemble(scenario, seed, road, model)
+        Self::assemble_in(scenario, seed, road, model, folder)
     }
 
     /// As [`Self::new`], with the road and the truck already read (batches share them).
@@ -59,15 +92,19 @@ impl World {
         road: Arc<Road>,
         model: Arc<TruckModel>,
     ) -> Result<Self, SimError> {
+        Self::assemble_in(scenario, seed, road, model, None)
+    }
+
+    fn assemble_in(
+        scenario: &Scenario,
+        seed: u64,
+        road: Arc<Road>,
+        model: Arc<TruckModel>,
+        folder: Option<&Path>,
+    ) -> Result<Self, SimError> {
         let truck = SimTruck::new(model, Arc::clone(&road), &scenario.ego, &scenario.weather)?;
         let geometry = truck.limits().geometry;
-        let traffic = match scenario.traffic.source {
-            TrafficKind::None => Traffic::None(Scene::default()),
-            TrafficKind::Native => {
-                let config = TrafficConfig { seed, ..scenario.traffic.native.clone() };
-                Traffic::Native(Box::new(NativeTraffic::new(Arc::clone(&road), geometry, config)?))
-            }
-        };
+        let traffic = Traffic::new(scenario, seed, &road, geometry, folder)?;
         let config = StackConfig {
             rates: RatesConfig::for_tick(scenario.run.tick_s),
             ..scenario.stack.clone()
@@ -76,6 +113,7 @@ impl World {
         let stack = Stack::new(config, truck.limits())?;
         Ok(Self {
             metrics,
+            sensors: scenario.traffic.perception.enabled,
             scenario: scenario.clone(),
             road,
             truck,
@@ -96,16 +134,19 @@ impl World {
         if self.status != Status::Running {
             return Ok(self.status);
         }
-        let mut both = (&mut self.metrics, recorder);
+        let mut judge = Judge { metrics: &mut self.metrics, unseen: None, sensors: self.sensors };
         planner::drive_tick(
             self.now,
             &mut self.truck,
             &mut self.traffic,
             &mut self.stack,
             &self.road,
-            &mut both,
+            &mut (&mut judge, recorder),
         )
         .map_err(SimError::from)?;
+        if let (Some((ego, plan)), Some(scene)) = (judge.unseen, self.traffic.truth()) {
+            self.metrics.record(&Tick { now: self.now, ego: &ego, scene, plan: &plan });
+        }
         self.now = self.now.plus_nanos(self.tick_ns);
         let front_m = self.truck.state().s_m + self.truck.limits().geometry.front_m;
         if front_m + END_MARGIN_M >= self.road.length_m() {
@@ -164,6 +205,17 @@ impl World {
     /// The planning stack (to request a lane change from outside, say).
     pub const fn stack_mut(&mut self) -> &mut Stack {
         &mut self.stack
+    }
+
+    /// The traffic: its mode, manifest and failure.
+    #[must_use]
+    pub const fn traffic(&self) -> &Traffic {
+        &self.traffic
+    }
+
+    /// The traffic, to reach SUMO's variables.
+    pub const fn traffic_mut(&mut self) -> &mut Traffic {
+        &mut self.traffic
     }
 
     /// The truck.

@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (folder, vehicles) = (Path::new(&folder), vehicles.parse::<usize>()?);
     let programs = Programs::find(None)?;
     let road = Arc::new(builtin::highway());
-    let network = convert(&programs, &road, folder)?;
+    let network = convert(&programs, &road, folder, &[])?;
     let routes = folder.join("bench.rou.xml");
     std::fs::write(&routes, demand(&network, vehicles))?;
     let options: Vec<String> = [

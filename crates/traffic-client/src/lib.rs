@@ -3,6 +3,7 @@
 //! [`native`]: IDM car following and MOBIL lane changes on any road, deterministic to the bit.
 //! [`sumo`]: SUMO over TraCI. [`replay`]: recorded trajectories. Every source implements [`tractrix_core::TrafficSource`].
 
+pub mod calibrate;
 mod error;
 mod hash;
 mod mode;
@@ -10,6 +11,7 @@ pub mod native;
 mod perception;
 mod philox;
 pub mod replay;
+pub mod stats;
 pub mod sumo;
 
 pub use error::TrafficError;

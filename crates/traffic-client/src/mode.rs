@@ -114,6 +114,15 @@ impl Manifest {
     /// [`TrafficError::Manifest`] names the first that does not.
     pub fn check_inputs(&self, now: &Self) -> Result<(), TrafficError> {
         let differs = |what: &str, was: &str, is: &str| {
+            // Of long texts, the first line that differs says enough.
+            let lines = was.lines().map(Some).chain(std::iter::repeat(None));
+            let others = is.lines().map(Some).chain(std::iter::repeat(None));
+            let (was, is) = lines
+                .zip(others)
+                .take_while(|pair| *pair != (None, None))
+                .find(|(a, b)| a != b)
+                .unwrap_or((Some(was), Some(is)));
+            let (was, is) = (was.unwrap_or("nothing"), is.unwrap_or("nothing"));
             Err(TrafficError::Manifest { why: format!("{what} was `{was}`, is `{is}`") })
         };
         if self.engine != now.engine {
@@ -133,7 +142,7 @@ impl Manifest {
 }
 
 /// A source whose scenes are fingerprinted, and compared with a manifest in mode `re`.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Hashed<S> {
     inner: S,
     hash: Fnv,
@@ -166,6 +175,12 @@ impl<S> Hashed<S> {
     /// The source inside.
     pub fn inner_mut(&mut self) -> &mut S {
         &mut self.inner
+    }
+
+    /// The source inside.
+    #[must_use]
+    pub fn inner(&self) -> &S {
+        &self.inner
     }
 }
 

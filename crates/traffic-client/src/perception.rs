@@ -87,7 +87,7 @@ impl PerceptionConfig {
 }
 
 /// A source seen through sensors.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Perceived<S> {
     inner: S,
     config: PerceptionConfig,
@@ -111,17 +111,29 @@ impl<S> Perceived<S> {
     pub fn inner_mut(&mut self) -> &mut S {
         &mut self.inner
     }
+
+    /// The source inside.
+    #[must_use]
+    pub fn inner(&self) -> &S {
+        &self.inner
+    }
+
+    /// The latest scene as it is, while the sensors are on: what a run is judged by. `None` while
+    /// they are off, when what is seen is what is there.
+    #[must_use]
+    pub fn truth(&self) -> Option<&Scene> {
+        self.past.back()
+    }
 }
 
 impl<S: TrafficSource<Error = TrafficError>> TrafficSource for Perceived<S> {
     type Error = TrafficError;
 
     fn advance(&mut self, now: Time, ego: &EgoState) -> Result<&Scene, TrafficError> {
-        let truth = self.inner.advance(now, ego)?;
         if !self.config.enabled {
-            self.scene.clone_from(truth);
-            return Ok(&self.scene);
+            return self.inner.advance(now, ego);
         }
+        let truth = self.inner.advance(now, ego)?;
         let mut copy = self.spare.pop().unwrap_or_default();
         copy.time = truth.time;
         copy.neighbours.clone_from(&truth.neighbours);

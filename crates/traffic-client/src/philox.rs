@@ -16,6 +16,10 @@ pub(crate) enum Stream {
     Fill = 3,
     /// Sensor noise; index = frame, the vehicle is in the key.
     Perception = 4,
+    /// Speed beyond the end of the road; index = period, number = lane track.
+    Outflow = 5,
+    /// Search for parameters; index = trial, number = which draw of it.
+    Search = 6,
 }
 
 const M0: u64 = 0xD251_1F53;

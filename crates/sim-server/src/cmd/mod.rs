@@ -6,6 +6,7 @@ pub(crate) mod plan;
 pub(crate) mod recover;
 pub(crate) mod run;
 pub(crate) mod scenario;
+pub(crate) mod traffic;
 
 use clap::Parser;
 
@@ -19,6 +20,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Plan(args)) => plan::run(&args),
         Some(Command::Diagnose(args)) => diagnose::run(&args),
+        Some(Command::Traffic(args)) => traffic::run(&args),
         Some(Command::Map(command)) => map::run(command),
         Some(Command::Recover(args)) => recover::run(&args),
         Some(Command::Scenario(command)) => scenario::run(&command),

@@ -10,7 +10,7 @@ use crate::driver::Pace;
 use crate::failure::Failure;
 
 mod execute;
-mod options;
+pub(super) mod options;
 
 /// Drives a scenario in closed loop, with a live dashboard, and records it.
 #[derive(Debug, Parser)]
@@ -27,12 +27,19 @@ pub(crate) struct Args {
     /// Another payload on the trailer.
     #[arg(long, value_name = "KG", value_parser = crate::cli::not_negative)]
     payload_kg: Option<f64>,
-    /// The other vehicles: native or none; sumo and replay:FILE are not supported yet.
+    /// The other vehicles: native, sumo, replay:FILE or none.
     #[arg(long, value_name = "SOURCE")]
     traffic: Option<String>,
-    /// How traffic reacts to the ego (pure, inter, re, rep); for sumo and replay traffic.
+    /// pure (does not see the ego), inter (reacts to it), re (a run again, with --manifest), rep
+    /// (recorded).
     #[arg(long)]
     mode: Option<String>,
+    /// traffic.manifest.toml of the run that mode re repeats; its seed is taken too.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+    /// When the traffic source fails: stop, or native (the native engine goes on).
+    #[arg(long, value_name = "WHAT")]
+    on_traffic_failure: Option<String>,
     /// Who decides on lane changes: keep, rules:50, rules:100, rules:150, mobil.
     #[arg(long)]
     decider: Option<String>,
@@ -48,9 +55,9 @@ pub(crate) struct Args {
     /// realtime, max, or simulated seconds per second [default: realtime, max with --headless].
     #[arg(long)]
     pace: Option<Pace>,
-    /// Seed of everything that is drawn at random.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
+    /// Seed of everything that is drawn at random [default: 1, or the manifest's].
+    #[arg(long)]
+    seed: Option<u64>,
     /// Folder of run.mcap and summary.json [default: a new one under runs/].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -77,5 +84,6 @@ pub(crate) struct Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let scenario = options::scenario(args)?;
-    execute::execute(args, &scenario)
+    let seed = options::seed(args.seed, &scenario)?;
+    execute::execute(args, seed, &scenario)
 }

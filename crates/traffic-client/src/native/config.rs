@@ -88,6 +88,13 @@ pub struct TrafficConfig {
     pub mandatory_ahead_m: f64,
     /// Braking that a driver accepts to let another one merge, m/s².
     pub yield_decel_m_s2: f64,
+    /// Mean speed of the traffic beyond the end of the road, m/s: what congestion comes from.
+    /// `None`: the road goes on free.
+    pub outflow_speed_m_s: Option<f64>,
+    /// Standard deviation of that speed, m/s; it changes from lane to lane and in time.
+    pub outflow_sigma_m_s: f64,
+    /// Time between two independent draws of that speed, s; in between it goes over linearly.
+    pub outflow_period_s: f64,
     /// Passenger cars.
     pub car: ClassConfig,
     /// Light commercial vehicles.
@@ -167,6 +174,9 @@ impl Default for TrafficConfig {
             sees_ego: true,
             mandatory_ahead_m: 800.0,
             yield_decel_m_s2: 1.5,
+            outflow_speed_m_s: None,
+            outflow_sigma_m_s: 0.0,
+            outflow_period_s: 20.0,
             car,
             van,
             truck,
@@ -264,6 +274,9 @@ impl TrafficConfig {
             ("scene_radius_m", self.scene_radius_m, 1.0, 100_000.0),
             ("mandatory_ahead_m", self.mandatory_ahead_m, 10.0, 10_000.0),
             ("yield_decel_m_s2", self.yield_decel_m_s2, 0.0, 5.0),
+            ("outflow_speed_m_s", self.outflow_speed_m_s.unwrap_or(0.0), 0.0, 70.0),
+            ("outflow_sigma_m_s", self.outflow_sigma_m_s, 0.0, 30.0),
+            ("outflow_period_s", self.outflow_period_s, 1.0, 3600.0),
         ] {
             check(key.to_owned(), value, low, high);
         }

@@ -40,6 +40,17 @@ impl Driver {
         } else {
             VehicleClass::Car
         };
+        Self::of_class(config, index, class, exits)
+    }
+
+    /// As [`Driver::draw`], of a vehicle whose class is known.
+    pub(crate) fn of_class(
+        config: &TrafficConfig,
+        index: u64,
+        class: VehicleClass,
+        exits: impl Iterator<Item = u16>,
+    ) -> Self {
+        let d = Draws::new(config.seed, Stream::Driver, index);
         let c = config.class(class);
         // Bounded by construction: bell() within ±3.47 and spread_frac at most 0.25.
         let about = |mean: f64, number: u32| mean * (1.0 + c.spread_frac * d.bell(number));

@@ -14,6 +14,7 @@ use super::idm::{Idm, ballistic};
 use super::lanes::{LaneMap, NO_LANE};
 use super::mobil::{Change, Mobil};
 use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT};
+use crate::philox::{Draws, Stream};
 
 /// Length of a tick, s.
 pub(crate) const TICK_S: f64 = 0.1;
@@ -28,6 +29,9 @@ const MAKE_ROOM_M: f64 = 300.0;
 const APART_M: f64 = 150.0;
 /// A vehicle stops this far before the end of its lane, m.
 const END_MARGIN_M: f64 = 2.0;
+
+/// Drivers adapt to the speed beyond the end of the road over this stretch before it, m.
+const BEYOND_M: f64 = 60.0;
 
 /// Everything that changes: what a snapshot holds.
 #[derive(Debug, Default, PartialEq)]
@@ -74,6 +78,8 @@ pub(crate) struct Engine {
     raw_a_m_s2: Vec<f64>,
     /// Stations at which changes into each lane began in this tick, m.
     begun_m: Vec<f64>,
+    /// Speed beyond the end of the road per lane, m/s; empty where the road goes on free.
+    beyond_m_s: Vec<f64>,
     /// How other drivers expect the ego to follow.
     ego_driver: Idm,
 }
@@ -101,12 +107,14 @@ impl Engine {
             near: Neighbourhood::default(),
             raw_a_m_s2: Vec::new(),
             begun_m: Vec::new(),
+            beyond_m_s: Vec::new(),
             ego_driver: Idm::new(25.0, 1.5, 3.0, 0.6, 1.5, 6.0),
         }
     }
 
     /// Fixes the accelerations and begins lane changes; the ego spans are those of this instant.
     pub(crate) fn decide(&mut self) {
+        self.look_beyond();
         let (fleet, map, tick) = (&self.state.fleet, &self.map, self.state.tick);
         self.near.find(fleet, map, &self.ego, |i| {
             is_due(tick, fleet.id[i])
@@ -147,7 +155,28 @@ impl Engine {
         let fleet = &self.state.fleet;
         let limit = self.map.lanes[lane as usize].limit_m_s(fleet.s_m[i]);
         let driver = &fleet.driver[i];
-        driver.idm.free_m_s2(fleet.v_m_s[i], limit * driver.limit_factor)
+        let mut wish_m_s = limit * driver.limit_factor;
+        if fleet.s_m[i] > self.map.s_end_m - BEYOND_M
+            && let Some(&beyond_m_s) = self.beyond_m_s.get(lane as usize)
+        {
+            wish_m_s = wish_m_s.min(beyond_m_s);
+        }
+        driver.idm.free_m_s2(fleet.v_m_s[i], wish_m_s)
+    }
+
+    /// The speed at which traffic moves beyond the end of the road at this tick, per lane.
+    fn look_beyond(&mut self) {
+        let Some(mean_m_s) = self.config.outflow_speed_m_s else { return };
+        let (sigma_m_s, seed) = (self.config.outflow_sigma_m_s, self.config.seed);
+        let period = ((self.config.outflow_period_s / TICK_S) as u64).max(1);
+        let (k, rest) = (self.state.tick / period, self.state.tick % period);
+        let f = rest as f64 / period as f64;
+        self.beyond_m_s.clear();
+        for lane in 0..self.map.lanes.len() as u32 {
+            let draw = |k| mean_m_s + sigma_m_s * Draws::new(seed, Stream::Outflow, k).bell(lane);
+            let (from, to) = (draw(k), draw(k + 1));
+            self.beyond_m_s.push((from + f * (to - from)).max(0.0));
+        }
     }
 
     /// What the leader in `lane` takes away, m/s².

@@ -1,5 +1,7 @@
 //! Where vehicles come from: the first fill of the road, and arrivals at the entries.
 
+use tractrix_core::Scene;
+
 use super::driver::Driver;
 use super::engine::{Engine, TICK_S};
 use super::fleet::Fleet;
@@ -8,6 +10,9 @@ use crate::philox::{Draws, Stream};
 
 /// Arrivals that wait for room at one entry, at most.
 const QUEUE: u32 = 50;
+
+/// Room between the vehicles of a scene that is taken over and those of our own, m.
+const SEAM_M: f64 = 60.0;
 
 /// A vehicle of the first fill.
 struct Start {
@@ -19,10 +24,14 @@ struct Start {
 }
 
 impl Engine {
-    fn draw(&self, id: u64, s_m: f64) -> Driver {
+    /// Off-ramps that begin after a station, nearest first.
+    fn exits_after(&self, s_m: f64) -> impl Iterator<Item = u16> {
         let exits = self.map.exits.iter().copied();
-        let ahead = exits.filter(|&k| self.map.lanes[k as usize].s_start_m > s_m);
-        Driver::draw(&self.config, id, ahead)
+        exits.filter(move |&k| self.map.lanes[k as usize].s_start_m > s_m)
+    }
+
+    fn draw(&self, id: u64, s_m: f64) -> Driver {
+        Driver::draw(&self.config, id, self.exits_after(s_m))
     }
 
     /// Fills the through lanes with the configured density. Spacings vary by a factor; where they
@@ -66,6 +75,35 @@ impl Engine {
         self.state.fleet = Fleet::default();
         for x in starts {
             self.state.fleet.insert(x.s_m, x.v_m_s, x.lane, x.id, x.driver);
+        }
+    }
+
+    /// Puts the vehicles of a scene in the place of those on its stretch. Numbers of vehicles that
+    /// come later are above all of theirs.
+    pub(crate) fn adopt(&mut self, scene: &Scene) {
+        let rears = scene.neighbours.iter().map(|n| n.rear_s_m);
+        let fronts = scene.neighbours.iter().map(|n| n.front_s_m);
+        let from_m = rears.fold(f64::INFINITY, f64::min) - SEAM_M;
+        let to_m = fronts.fold(f64::NEG_INFINITY, f64::max) + SEAM_M;
+        self.state.fleet.retain(|f, i| f.s_m[i] < from_m || f.rear_m(i) > to_m);
+        let first = scene.neighbours.iter().map(|n| n.id + 1).max().unwrap_or(0);
+        for id in &mut self.state.fleet.id {
+            *id += first;
+        }
+        self.state.next_id += first;
+        for n in &scene.neighbours {
+            if usize::from(n.lane) >= self.map.lanes.len() {
+                continue;
+            }
+            let exits = self.exits_after(n.front_s_m);
+            let drawn = Driver::of_class(&self.config, n.id, n.class, exits);
+            let driver = Driver { length_m: n.length_m(), ..drawn };
+            self.state.fleet.insert(n.front_s_m, n.speed_m_s.max(0.0), n.lane, n.id, driver);
+            let target = n.target_lane.filter(|&t| usize::from(t) < self.map.lanes.len());
+            if let Some(target) = target {
+                let i = self.state.fleet.id.iter().position(|&id| id == n.id).unwrap_or(0);
+                self.state.fleet.target[i] = target;
+            }
         }
     }
 

@@ -67,6 +67,26 @@ impl NativeTraffic {
         Ok(Self { engine, road, geometry, tick_start: None, scene: Scene::default() })
     }
 
+    /// Traffic that goes on from a scene of another source: its vehicles where they are, with
+    /// drivers of our own, and our traffic beyond the stretch that they lie on. Vehicles within a
+    /// lane change finish it as if it had just begun.
+    ///
+    /// # Errors
+    /// As [`NativeTraffic::new`].
+    pub fn take_over(
+        road: Arc<Road>,
+        geometry: Geometry,
+        config: TrafficConfig,
+        scene: &Scene,
+    ) -> Result<Self, TrafficError> {
+        let mut traffic = Self::new(road, geometry, config)?;
+        traffic.engine.adopt(scene);
+        // The vehicles around the ego are those of the scene: nobody is taken away.
+        traffic.tick_start = Some(scene.time);
+        traffic.engine.decide();
+        Ok(traffic)
+    }
+
     /// The configuration.
     #[must_use]
     pub fn config(&self) -> &TrafficConfig {

@@ -23,7 +23,8 @@ const NGSIM_HZ: f64 = 10.0;
 const HIGHD_HZ: f64 = 25.0;
 
 /// Which carriageway of a recording with two is kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Carriageway {
     /// Vehicles that drive towards growing x.
     #[default]

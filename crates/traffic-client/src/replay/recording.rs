@@ -158,6 +158,15 @@ impl Recording {
     }
 }
 
+/// The class of a vehicle that is known by its length only.
+pub(crate) fn class_of_length(length_m: f64) -> VehicleClass {
+    match length_m {
+        l if l >= TRUCK_M => VehicleClass::Truck,
+        l if l >= VAN_M => VehicleClass::Van,
+        _ => VehicleClass::Car,
+    }
+}
+
 /// Resamples the observations of one vehicle; `None` if they do not reach over one step.
 fn track(rows: &[Row], step_s: f64) -> Option<Track> {
     let (head, tail) = (rows.first()?, rows.last()?);
@@ -195,11 +204,7 @@ fn track(rows: &[Row], step_s: f64) -> Option<Track> {
         samples.push(Sample { x_m, y_m, yaw_rad, speed_m_s: speed.unwrap_or(moved / dt) });
     }
     let length_m = head.length_m.filter(|l| *l > 0.5).unwrap_or(LENGTH_M);
-    let class = head.class.unwrap_or(match length_m {
-        l if l >= TRUCK_M => VehicleClass::Truck,
-        l if l >= VAN_M => VehicleClass::Van,
-        _ => VehicleClass::Car,
-    });
+    let class = head.class.unwrap_or_else(|| class_of_length(length_m));
     let width_m = head.width_m.filter(|w| *w > 0.2).unwrap_or(WIDTH_M);
     Some(Track { id: head.id, class, length_m, width_m, first, samples })
 }

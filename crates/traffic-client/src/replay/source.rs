@@ -48,7 +48,7 @@ struct Tracked {
 }
 
 /// Recorded traffic on a road.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct ReplayTraffic {
     road: Arc<Road>,
     config: ReplayConfig,

@@ -4,13 +4,16 @@
 //! Car following is SUMO's IDM, lane changing its LC2013 (SUMO has no MOBIL), with changes that take
 //! time (`--lanechange.duration`). Trucks do not slow on grades in SUMO; that is a limit of SUMO.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use tractrix_core::{Geometry, VehicleClass};
 
 use super::network::Network;
+use super::source::SumoConfig;
 use crate::native::{ClassConfig, TrafficConfig};
 use crate::philox::{Draws, Stream};
+use crate::replay::class_of_length;
 
 /// Id of the ego in SUMO, and of its type.
 pub(crate) const EGO: &str = "ego";
@@ -27,22 +30,28 @@ const CLASSES: [(VehicleClass, &str, &str); 3] = [
     (VehicleClass::Truck, "truck", "trailer"),
 ];
 
-/// The class behind a type id.
-pub(crate) fn class_of(type_id: &str) -> VehicleClass {
+/// Is this one of our vehicle types?
+pub(crate) fn is_type(name: &str) -> bool {
+    CLASSES.iter().any(|(_, known, _)| *known == name)
+}
+
+/// The class behind a type id: ours by its name, another by the vehicle's length.
+pub(crate) fn class_of(type_id: &str, length_m: f64) -> VehicleClass {
     CLASSES
         .iter()
         .find(|(_, name, _)| type_id.starts_with(name))
-        .map_or(VehicleClass::Car, |(class, _, _)| *class)
+        .map_or_else(|| class_of_length(length_m), |(class, _, _)| *class)
 }
 
 /// The route file. `through` is the longest route; `free_m` the stretch of it that stays empty for
 /// the ego.
 pub(crate) fn route_file(
-    config: &TrafficConfig,
+    sumo: &SumoConfig,
     network: &Network,
     geometry: &Geometry,
     free_m: std::ops::Range<f64>,
 ) -> String {
+    let config = &sumo.traffic;
     let mut out = String::from("<routes>\n");
     let share = |class| match class {
         VehicleClass::Car => 1.0 - config.van_share_frac - config.truck_share_frac,
@@ -51,16 +60,19 @@ pub(crate) fn route_file(
     };
     let _ = writeln!(out, "<vTypeDistribution id=\"mix\">");
     for (class, name, v_class) in CLASSES {
-        vehicle_type(&mut out, name, v_class, config.class(class), share(class));
+        let extra = sumo.type_attributes.get(name);
+        vehicle_type(&mut out, name, v_class, config.class(class), share(class), extra);
     }
     let _ = writeln!(out, "</vTypeDistribution>");
-    let _ = writeln!(
-        out,
-        "<vType id=\"{EGO}\" vClass=\"trailer\" length=\"{:.2}\" width=\"{:.2}\" maxSpeed=\"60\" \
+    if config.sees_ego {
+        let _ = writeln!(
+            out,
+            "<vType id=\"{EGO}\" vClass=\"trailer\" length=\"{:.2}\" width=\"{:.2}\" maxSpeed=\"60\" \
          minGap=\"0.5\" insertionChecks=\"none\"/>",
-        geometry.length_m(),
-        geometry.width_m
-    );
+            geometry.length_m(),
+            geometry.width_m
+        );
+    }
     let entries = network.entries();
     let mut routes: Vec<Vec<String>> =
         entries.iter().flat_map(|entry| network.routes_from(entry)).collect();
@@ -77,23 +89,38 @@ pub(crate) fn route_file(
     out
 }
 
-fn vehicle_type(out: &mut String, name: &str, v_class: &str, c: &ClassConfig, share: f64) {
+fn vehicle_type(
+    out: &mut String,
+    name: &str,
+    v_class: &str,
+    c: &ClassConfig,
+    share: f64,
+    extra: Option<&BTreeMap<String, String>>,
+) {
     let (mean, sigma) = (c.speed_factor_frac, c.speed_factor_sigma_frac);
-    let _ = writeln!(
-        out,
-        "<vType id=\"{name}\" vClass=\"{v_class}\" probability=\"{share}\" carFollowModel=\"IDM\" \
-         length=\"{}\" width=\"{}\" tau=\"{}\" minGap=\"{}\" accel=\"{}\" decel=\"{}\" \
-         emergencyDecel=\"{}\" maxSpeed=\"70\" speedFactor=\"normc({mean},{sigma},{},{})\"/>",
-        c.length_m,
-        c.width_m,
-        c.headway_s,
-        c.min_gap_m,
-        c.accel_m_s2,
-        c.decel_m_s2,
-        c.max_decel_m_s2,
-        mean - 3.0 * sigma,
-        mean + 3.0 * sigma
-    );
+    let factor = format!("normc({mean},{sigma},{},{})", mean - 3.0 * sigma, mean + 3.0 * sigma);
+    let mut attributes: BTreeMap<&str, String> = [
+        ("vClass", v_class.to_owned()),
+        ("probability", share.to_string()),
+        ("carFollowModel", "IDM".to_owned()),
+        ("length", c.length_m.to_string()),
+        ("width", c.width_m.to_string()),
+        ("tau", c.headway_s.to_string()),
+        ("minGap", c.min_gap_m.to_string()),
+        ("accel", c.accel_m_s2.to_string()),
+        ("decel", c.decel_m_s2.to_string()),
+        ("emergencyDecel", c.max_decel_m_s2.to_string()),
+        ("maxSpeed", "70".to_owned()),
+        ("speedFactor", factor),
+    ]
+    .into();
+    attributes
+        .extend(extra.into_iter().flatten().map(|(key, value)| (key.as_str(), value.clone())));
+    let _ = write!(out, "<vType id=\"{name}\"");
+    for (key, value) in attributes {
+        let _ = write!(out, " {key}=\"{value}\"");
+    }
+    let _ = writeln!(out, "/>");
 }
 
 /// Vehicles at the start, spaced as in native traffic, along the through route.
@@ -114,21 +141,37 @@ fn fill(
         let length_m = network.lanes_of(edge).next().map_or(0.0, |lane| lane.length_m);
         let rest = through.get(k..).unwrap_or_default().join(" ");
         for lane in network.lanes_of(edge) {
+            let mut row = Vec::new();
             let mut at_m = 0.0;
             loop {
                 let draws = Draws::new(config.seed, Stream::Fill, number);
                 number += 1;
-                at_m += ((0.3 + 1.4 * draws.uniform(0)) * 1000.0 / density).max(25.0);
+                let share = draws.uniform(1);
+                let (class, name, _) = match share - config.truck_share_frac {
+                    x if x < 0.0 => CLASSES[2],
+                    x if x < config.van_share_frac => CLASSES[1],
+                    _ => CLASSES[0],
+                };
+                let own = config.class(class);
+                let spacing_m = (0.3 + 1.4 * draws.uniform(0)) * 1000.0 / density;
+                at_m += spacing_m.max(own.length_m + 1.5 * own.min_gap_m);
                 if at_m > length_m {
                     break;
                 }
-                if free_m.contains(&(begin_m + at_m)) {
-                    continue;
+                if !free_m.contains(&(begin_m + at_m)) {
+                    row.push((at_m, name, own, number));
                 }
-                let speed = 0.9 * lane.speed_m_s.min(config.max_speed_m_s);
+            }
+            for (i, &(at_m, name, own, number)) in row.iter().enumerate() {
+                // Nobody starts faster than their headway allows.
+                let keeps_m_s = row.get(i + 1).map_or(f64::INFINITY, |&(ahead_m, _, ahead, _)| {
+                    (ahead_m - ahead.length_m - at_m - own.min_gap_m) / own.headway_s
+                });
+                let wish_m_s = 0.9 * lane.speed_m_s.min(config.max_speed_m_s);
+                let speed = wish_m_s.min(keeps_m_s).max(0.0);
                 let _ = writeln!(
                     out,
-                    "<vehicle id=\"fill{number}\" type=\"mix\" depart=\"0\" departLane=\"{}\" \
+                    "<vehicle id=\"fill{number}\" type=\"{name}\" depart=\"0\" departLane=\"{}\" \
                      departPos=\"{at_m:.2}\" departSpeed=\"{speed:.2}\" insertionChecks=\"none\">\
                      <route edges=\"{rest}\"/></vehicle>",
                     lane.index

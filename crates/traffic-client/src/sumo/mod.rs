@@ -21,4 +21,4 @@ pub use check::{ImportCheck, TOLERANCE_M, check};
 pub use error::SumoError;
 pub use link::{Link, Timeouts};
 pub use process::Programs;
-pub use source::{SumoConfig, SumoTraffic};
+pub use source::{SumoConfig, SumoTraffic, TypeAttributes};

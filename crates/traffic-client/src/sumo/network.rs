@@ -56,12 +56,18 @@ pub struct Network {
     pub next: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// Brings a road into SUMO: writes plain files into `folder`, runs netconvert, reads the result.
+/// Brings a road into SUMO: writes plain files into `folder`, runs netconvert with
+/// these further options, reads the result.
 ///
 /// # Errors
 /// [`SumoError::NetConvert`] with its words, [`SumoError::Map`] if its output is unusable,
 /// [`SumoError::File`].
-pub fn convert(programs: &Programs, road: &Road, folder: &Path) -> Result<Network, SumoError> {
+pub fn convert(
+    programs: &Programs,
+    road: &Road,
+    folder: &Path,
+    options: &[String],
+) -> Result<Network, SumoError> {
     let text = plain(road);
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
@@ -79,6 +85,7 @@ pub fn convert(programs: &Programs, road: &Road, folder: &Path) -> Result<Networ
         .arg("-o")
         .arg(net)
         .args(OPTIONS)
+        .args(options)
         .output()
         .map_err(|e| SumoError::NetConvert {
             exit: "not started".to_owned(),

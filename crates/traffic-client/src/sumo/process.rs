@@ -62,6 +62,26 @@ impl Programs {
         Self { netconvert: bin.join("netconvert"), sumo, home }
     }
 
+    /// What SUMO calls itself and its version: `SUMO 1.28.0`.
+    ///
+    /// # Errors
+    /// [`SumoError::Startup`] if it cannot be asked.
+    pub fn version(&self) -> Result<String, SumoError> {
+        let failed =
+            |stderr: String| SumoError::Startup { exit: "no version given".to_owned(), stderr };
+        let out = self
+            .command(&self.sumo)
+            .arg("--version")
+            .output()
+            .map_err(|e| failed(format!("{}: {e}", self.sumo.display())))?;
+        let text = String::from_utf8_lossy(&out.stdout);
+        let number = text.lines().next().and_then(|line| line.split_whitespace().last());
+        number
+            .filter(|_| out.status.success())
+            .map(|number| format!("SUMO {}", number.trim_start_matches('v')))
+            .ok_or_else(|| failed(String::from_utf8_lossy(&out.stderr).trim().to_owned()))
+    }
+
     /// A command with the environment that SUMO's programs need.
     pub(crate) fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);

@@ -8,6 +8,7 @@
 //! SUMO's drivers do not see an externally moved truck before its centre crosses a lane line. While
 //! the ego reaches into a neighbour lane, a *ghost* of its size drives in that lane.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,7 +17,7 @@ use tractrix_core::{EgoState, Geometry, Neighbour, Scene, Time, TrafficSource, V
 
 use super::check::{ImportCheck, check};
 use super::codec::Value;
-use super::demand::{EGO, EGO_ROUTE, GHOST, class_of, route_file};
+use super::demand::{EGO, EGO_ROUTE, GHOST, class_of, is_type, route_file};
 use super::error::SumoError;
 use super::link::{Link, Timeouts};
 use super::network::{Network, convert, file_error};
@@ -43,6 +44,38 @@ pub struct SumoConfig {
     pub timeouts: Timeouts,
     /// Further options for SUMO, as on its command line.
     pub options: Vec<String>,
+    /// SUMO's additional files (detectors, signal programs, vehicle types, ...), loaded after ours.
+    pub additional_files: Vec<PathBuf>,
+    /// Further options for netconvert, such as `--tls.set`, which makes traffic lights.
+    pub netconvert_options: Vec<String>,
+    /// Attributes of SUMO's vehicle types `car`, `van`, `truck`, in place of ours or beside them:
+    /// `carFollowModel`, `laneChangeModel`, `lcAssertive`, ...
+    pub type_attributes: TypeAttributes,
+}
+
+/// Attributes of vehicle types: type, then attribute and value.
+pub type TypeAttributes = BTreeMap<String, BTreeMap<String, String>>;
+
+impl SumoConfig {
+    /// SUMO itself says nothing of a missing file before it is gone, so this is said here.
+    fn check_files_and_types(&self) -> Result<(), TrafficError> {
+        let bad = |why: String| Err(TrafficError::Config { why });
+        if let Some(missing) = self.additional_files.iter().find(|file| !file.is_file()) {
+            return bad(format!("sumo.additional_files: no file {}", missing.display()));
+        }
+        for (name, attributes) in &self.type_attributes {
+            if !is_type(name) {
+                return bad(format!("sumo.type_attributes.{name}: not one of car, van, truck"));
+            }
+            let plain = |text: &str| !text.contains(['"', '<', '&']);
+            if let Some((key, value)) =
+                attributes.iter().find(|(key, value)| !plain(key) || !plain(value))
+            {
+                return bad(format!("sumo.type_attributes.{name}.{key} = {value:?} is not plain"));
+            }
+        }
+        Ok(())
+    }
 }
 
 /// What does not change about a vehicle.
@@ -93,8 +126,9 @@ impl SumoTraffic {
         folder: &Path,
     ) -> Result<Self, TrafficError> {
         config.traffic.validate()?;
+        config.check_files_and_types()?;
         let programs = Programs::find(config.binary.as_deref())?;
-        let network = convert(&programs, &road, folder)?;
+        let network = convert(&programs, &road, folder, &config.netconvert_options)?;
         let import = check(&network, &road)?;
         let map = lane_map(&road)?;
         Ok(Self {
@@ -136,6 +170,18 @@ impl SumoTraffic {
         self.link.as_ref().map(|link| (link.name.as_str(), link.api))
     }
 
+    /// The latest scene: where the vehicles were when SUMO was heard of last.
+    #[must_use]
+    pub fn last_scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// The programs that are used.
+    #[must_use]
+    pub fn programs(&self) -> &Programs {
+        &self.programs
+    }
+
     /// Process id of the running SUMO.
     #[must_use]
     pub fn pid(&self) -> Option<u32> {
@@ -148,7 +194,12 @@ impl SumoTraffic {
         let path = |name: &str| self.folder.join(name).display().to_string();
         let mut options = vec!["-n".to_owned(), self.network.file.display().to_string()];
         options.extend(["-r".to_owned(), path("demand.rou.xml")]);
-        options.extend(["-a".to_owned(), path("eye.add.xml")]);
+        let mut additional = path("eye.add.xml");
+        for file in &self.config.additional_files {
+            additional.push(',');
+            additional.push_str(&file.display().to_string());
+        }
+        options.extend(["-a".to_owned(), additional]);
         options.extend(["--seed".to_owned(), (self.config.traffic.seed & 0x7fff_ffff).to_string()]);
         let fixed = "--step-length 0.1 --thread-rngs 64 --no-step-log --duration-log.disable \
              --no-warnings --xml-validation never --time-to-teleport -1 --collision.action none \
@@ -229,7 +280,7 @@ impl SumoTraffic {
             let path = self.folder.join(name);
             std::fs::write(&path, text).map_err(|e| file_error(&path, &e))
         };
-        let demand = route_file(&self.config.traffic, &self.network, &self.geometry, free);
+        let demand = route_file(&self.config, &self.network, &self.geometry, free);
         write("demand.rou.xml", &demand)?;
         write(
             "eye.add.xml",
@@ -355,7 +406,7 @@ impl SumoTraffic {
                 *body = Body {
                     known: true,
                     hidden: name == EGO || name == GHOST,
-                    class: class_of(type_id),
+                    class: class_of(type_id, *length_m),
                     length_m: *length_m,
                     width_m: *width_m,
                     hint_s_m: None,

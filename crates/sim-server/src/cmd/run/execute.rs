@@ -9,6 +9,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde::Serialize;
 use sim::{Scenario, Summary, World};
 use tractrix_core::Vehicle;
+use traffic_client::Mode;
 
 use super::Args;
 use crate::dashboard::{self, Dashboard, Publisher, Shared};
@@ -26,6 +27,7 @@ struct RunSummary {
     provenance: Provenance,
     scenario: String,
     end_reason: EndReason,
+    traffic: TrafficSummary,
     #[serde(flatten)]
     summary: Summary,
     missed_deadlines: u64,
@@ -35,15 +37,25 @@ struct RunSummary {
     realtime_factor: f64,
 }
 
+/// Where the other vehicles came from.
+#[derive(Debug, Serialize)]
+struct TrafficSummary {
+    /// Engine and version.
+    engine: String,
+    mode: Mode,
+    /// Why the native engine went on in its place.
+    failure: Option<String>,
+}
+
 /// Viewers get this long to take the last frame before the server goes.
 const LAST_FRAME_TIME: Duration = Duration::from_millis(200);
 
 /// Drives the scenario as the options say.
-pub(super) fn execute(args: &Args, scenario: &Scenario) -> Result<(), Failure> {
-    let world = World::new(scenario, args.seed).map_err(Failure::input)?;
+pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(), Failure> {
     let listener = if args.headless { None } else { Some(dashboard::bind(args.port)?) };
-    let folder = out_folder(args, scenario);
-    let provenance = Provenance::of_seed(args.seed);
+    let folder = out_folder(args, seed, scenario);
+    let world = World::in_folder(scenario, seed, &folder.join("sumo")).map_err(Failure::input)?;
+    let provenance = Provenance::of_seed(seed);
     let combination = Combination::new(world.truck().limits());
     let (controls, received) = driver::channel();
     let shared = listener
@@ -56,7 +68,7 @@ pub(super) fn execute(args: &Args, scenario: &Scenario) -> Result<(), Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let pace = args.pace.unwrap_or(if args.headless { Pace::Max } else { Pace::REALTIME });
     let job = Job {
-        recording: start_recording(&folder, args.seed, scenario, &world, combination)?,
+        recording: start_recording(&folder, seed, scenario, &world, combination)?,
         progress: Progress::of_run(&world),
         world,
         pace,
@@ -93,11 +105,11 @@ pub(super) fn execute(args: &Args, scenario: &Scenario) -> Result<(), Failure> {
 }
 
 /// `--out`, or a folder that does not exist yet: `runs/SCENARIO-SEED`, `runs/SCENARIO-SEED-2`, …
-fn out_folder(args: &Args, scenario: &Scenario) -> PathBuf {
+fn out_folder(args: &Args, seed: u64, scenario: &Scenario) -> PathBuf {
     if let Some(out) = &args.out {
         return out.clone();
     }
-    let base = format!("runs/{}-{}", scenario.name, args.seed);
+    let base = format!("runs/{}-{seed}", scenario.name);
     let mut folder = PathBuf::from(&base);
     let mut number = 2_u32;
     while folder.exists() {
@@ -174,10 +186,16 @@ fn finish(
     folder: &Path,
 ) -> Result<(RunSummary, String), Failure> {
     let figures = ended.world.summary();
+    let manifest = ended.world.traffic().manifest();
     let summary = RunSummary {
         provenance,
         scenario: scenario.name.clone(),
         end_reason: ended.reason,
+        traffic: TrafficSummary {
+            engine: manifest.engine.clone(),
+            mode: ended.world.traffic().mode(),
+            failure: ended.world.traffic().failure().map(str::to_owned),
+        },
         missed_deadlines: ended.missed_deadlines,
         tick_time_us: ended.tick_time_us,
         pace,
@@ -193,6 +211,12 @@ fn finish(
     let path = folder.join("summary.json");
     std::fs::write(&path, &json).map_err(|e| Failure::work_on(&path, &e))?;
     recorded?;
+    let path = folder.join("traffic.manifest.toml");
+    let text = manifest.to_toml().map_err(Failure::work)?;
+    std::fs::write(&path, text).map_err(|e| Failure::work_on(&path, &e))?;
+    if let Some(why) = ended.world.traffic().failure() {
+        output::note(&format!("traffic: {why}; the native engine went on"));
+    }
     match ended.failure {
         Some(failure) => Err(failure),
         None => Ok((summary, json)),

@@ -1,10 +1,13 @@
 //! From options to the scenario that is driven.
 
+use std::path::Path;
+
 use planner::DeciderKind;
 use planner::decider::MobilConfig;
 use serde::Deserialize;
 use serde::de::value::{Error as ValueError, StrDeserializer};
-use sim::Scenario;
+use sim::{Scenario, TrafficKind};
+use traffic_client::Mode;
 
 use super::Args;
 use crate::failure::Failure;
@@ -28,9 +31,13 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
     if let Some(duration_s) = args.duration {
         scenario.run.duration_s = duration_s;
     }
-    if let Some(traffic) = &args.traffic {
-        scenario.traffic.source = word("--traffic", traffic, "native or none")?;
-    }
+    let changes = TrafficChanges {
+        source: args.traffic.as_deref(),
+        mode: args.mode.as_deref(),
+        manifest: args.manifest.as_deref(),
+        on_failure: args.on_traffic_failure.as_deref(),
+    };
+    changes.apply(&mut scenario)?;
     if let Some(planner) = &args.speed_planner {
         scenario.stack.speed_planner = word("--speed-planner", planner, "cruise or predictive")?;
     }
@@ -40,8 +47,78 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
     Ok(scenario)
 }
 
+/// The seed of a run: the one given, else the one of the manifest that is repeated, else 1.
+///
+/// # Errors
+/// [`Failure::Input`] for a manifest that cannot be read.
+pub(in crate::cmd) fn seed(given: Option<u64>, scenario: &Scenario) -> Result<u64, Failure> {
+    match (given, &scenario.traffic.manifest) {
+        (Some(seed), _) => Ok(seed),
+        (None, Some(file)) => {
+            sim::read_manifest(file.as_ref()).map(|m| m.seed).map_err(Failure::input)
+        }
+        (None, None) => Ok(1),
+    }
+}
+
+/// What options say about the traffic.
+#[derive(Debug, Default)]
+pub(in crate::cmd) struct TrafficChanges<'a> {
+    pub(in crate::cmd) source: Option<&'a str>,
+    pub(in crate::cmd) mode: Option<&'a str>,
+    pub(in crate::cmd) manifest: Option<&'a Path>,
+    pub(in crate::cmd) on_failure: Option<&'a str>,
+}
+
+impl TrafficChanges<'_> {
+    /// Puts them into a scenario.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] names the option, or what does not go together.
+    pub(in crate::cmd) fn apply(&self, scenario: &mut Scenario) -> Result<(), Failure> {
+        let traffic = &mut scenario.traffic;
+        match self.source.map(|source| (source, source.split_once(':'))) {
+            None => {}
+            Some((_, Some(("replay", file)))) if !file.is_empty() => {
+                traffic.source = TrafficKind::Replay;
+                traffic.replay.file = Some(file.to_owned());
+                traffic.mode = None;
+            }
+            Some((source, _)) => {
+                let known = "native, sumo, replay:FILE or none";
+                traffic.source = word("--traffic", source, known)?;
+                if traffic.source == TrafficKind::Replay && traffic.replay.file.is_none() {
+                    return Err(Failure::Input(format!("--traffic {source}: expected {known}")));
+                }
+            }
+        }
+        if let Some(mode) = self.mode {
+            traffic.mode = Some(word("--mode", mode, "pure, inter, re or rep")?);
+        }
+        if let Some(manifest) = self.manifest {
+            traffic.manifest = Some(manifest.display().to_string());
+            traffic.mode.get_or_insert(Mode::Re);
+        }
+        if let Some(on_failure) = self.on_failure {
+            traffic.on_failure = word("--on-traffic-failure", on_failure, "stop or native")?;
+        }
+        if self.mode == Some("re") && traffic.manifest.is_none() {
+            let why =
+                "--mode re: needs --manifest FILE, the traffic.manifest.toml of the run to repeat";
+            return Err(Failure::Input(why.to_owned()));
+        }
+        if self.mode == Some("rep") && traffic.source != TrafficKind::Replay {
+            return Err(Failure::Input("--mode rep: needs --traffic replay:FILE".to_owned()));
+        }
+        match scenario.violations() {
+            wrong if wrong.is_empty() => Ok(()),
+            wrong => Err(Failure::Input(wrong.join("; "))),
+        }
+    }
+}
+
 /// A file if it names one, else a built-in scenario.
-fn load(name: &str) -> Result<Scenario, Failure> {
+pub(in crate::cmd) fn load(name: &str) -> Result<Scenario, Failure> {
     if name.ends_with(".toml") || name.contains(std::path::MAIN_SEPARATOR) {
         Scenario::load(name.as_ref()).map_err(Failure::input)
     } else {
@@ -64,11 +141,8 @@ fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
         }
         _ => Ok(()),
     };
-    asked_for(&args.traffic, "--traffic", &["sumo", "replay"])?;
     asked_for(&args.decider, "--decider", &["external", "dqn"])?;
-    for (asked, flag) in
-        [(args.mode.is_some(), "--mode"), (args.ros2, "--ros2"), (args.foxglove, "--foxglove")]
-    {
+    for (asked, flag) in [(args.ros2, "--ros2"), (args.foxglove, "--foxglove")] {
         if asked {
             return Err(Failure::unsupported(flag));
         }

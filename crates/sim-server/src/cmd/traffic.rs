@@ -1,0 +1,237 @@
+//! `traffic`: traffic alone, measured against recordings; calibration of the drivers; the
+//! fundamental diagram.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::{Parser, ValueEnum};
+use road::Road;
+use sim::{Scenario, Traffic, TrafficKind};
+use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
+use traffic_client::Mode;
+use traffic_client::calibrate::{Effort, calibrate};
+use traffic_client::replay::{Frame, Recording, Row, write_parquet};
+use traffic_client::stats::Observer;
+
+use crate::cli::positive;
+use crate::cmd::run::options::{TrafficChanges, load, seed};
+use crate::failure::Failure;
+use crate::output;
+
+mod diagram;
+mod measured;
+mod plots;
+mod report;
+
+use self::measured::Measured;
+use self::report::Report;
+
+/// Drives traffic without a truck; writes trajectories.parquet, statistics.json, statistics.html.
+#[derive(Debug, Parser)]
+pub(crate) struct Args {
+    /// A scenario file, or the name of a built-in one; its truck is left out.
+    #[arg(long, default_value = "highway")]
+    scenario: String,
+    /// Simulated time that is observed [default: 300, or the length of the recording].
+    #[arg(long, value_name = "S", value_parser = positive)]
+    duration: Option<f64>,
+    /// Folder of the results.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Recordings to compare with: files, or folders of them.
+    #[arg(long, value_name = "MEASURED", num_args = 1..)]
+    compare: Vec<PathBuf>,
+    /// Calibrates the drivers to these recordings first; writes calibrated.toml.
+    #[arg(long, value_name = "MEASURED", num_args = 1..)]
+    calibrate: Vec<PathBuf>,
+    /// Generations of the calibration's search.
+    #[arg(long, default_value_t = 40, requires = "calibrate")]
+    generations: usize,
+    /// Lanes of the recorded road.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=12))]
+    lanes: u8,
+    /// Carriageway of recordings with two.
+    #[arg(long, value_enum, default_value_t = Direction::Forward)]
+    carriageway: Direction,
+    /// The other vehicles: native, sumo, replay:FILE or none.
+    #[arg(long, value_name = "SOURCE")]
+    traffic: Option<String>,
+    /// pure, re (with --manifest) or rep; inter is pure here, as there is no truck.
+    #[arg(long)]
+    mode: Option<String>,
+    /// traffic.manifest.toml of the run that mode re repeats; its seed is taken too.
+    #[arg(long, value_name = "FILE")]
+    manifest: Option<PathBuf>,
+    /// Another road; recording:LANES lays one under the recording of replay:FILE.
+    #[arg(long)]
+    road: Option<String>,
+    /// Draws flow over density for the native engine and, where it is installed, SUMO.
+    #[arg(long)]
+    diagram: bool,
+    /// Seed of everything that is drawn at random [default: 1, or the manifest's].
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Prints statistics.json on stdout instead of a sentence.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Direction {
+    /// Towards growing x.
+    Forward,
+    /// Towards falling x.
+    Backward,
+}
+
+/// Between two looks at the traffic, and two rows of a trajectory, s.
+const LOOK_S: f64 = 0.5;
+/// Time that is observed where nobody says otherwise, s.
+const DURATION_S: f64 = 300.0;
+
+/// Runs the command.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let mut scenario = load(&args.scenario)?;
+    if let Some(road) = &args.road {
+        scenario.road.clone_from(road);
+    }
+    TrafficChanges {
+        source: args.traffic.as_deref(),
+        mode: args.mode.as_deref(),
+        manifest: args.manifest.as_deref(),
+        on_failure: None,
+    }
+    .apply(&mut scenario)?;
+    if scenario.traffic.mode() == Mode::Inter {
+        scenario.traffic.mode = Some(Mode::Pure);
+    }
+    let seed = seed(args.seed, &scenario)?;
+    // Read before anything is written: what cannot be used is refused at once.
+    let read = |paths: &[PathBuf]| Measured::read(paths, args.lanes.into(), args.carriageway);
+    let measured = read(&args.compare)?;
+    let learned = read(&args.calibrate)?;
+    if !args.calibrate.is_empty() {
+        scenario = calibrated(args, scenario, &learned, seed)?;
+    }
+    if args.diagram {
+        diagram::draw(&scenario, seed, &args.out)?;
+    }
+    let driven = drive(args, &scenario, seed)?;
+    let report = Report::new(&scenario, seed, &driven, &measured, &args.calibrate);
+    let json = serde_json::to_string_pretty(&report).map_err(Failure::work)?;
+    write(&args.out.join("statistics.json"), &json)?;
+    let picture = plots::page(&report.sentence(), &driven.samples, &measured);
+    write(&args.out.join("statistics.html"), &picture)?;
+    output::result(if args.json { json } else { report.sentence() }.as_str());
+    Ok(())
+}
+
+/// Traffic that was driven and looked at.
+pub(crate) struct Driven {
+    pub(crate) samples: traffic_client::stats::Samples,
+    pub(crate) lanes_m: f64,
+    pub(crate) engine: String,
+    pub(crate) mode: Mode,
+}
+
+/// Drives the traffic of a scenario, and writes where everybody was.
+fn drive(args: &Args, scenario: &Scenario, seed: u64) -> Result<Driven, Failure> {
+    let road = Arc::new(scenario.load_road().map_err(Failure::input)?);
+    let mut scenario = scenario.clone();
+    scenario.traffic.native.scene_radius_m = road.length_m().max(1.0);
+    scenario.traffic.replay.scene_radius_m = road.length_m().max(1.0);
+    let geometry = Geometry::default();
+    let folder = args.out.join("sumo");
+    let mut traffic =
+        Traffic::new(&scenario, seed, &road, geometry, Some(&folder)).map_err(Failure::input)?;
+    let recorded_s = match scenario.traffic.source {
+        TrafficKind::Replay => {
+            Some(sim::recording_of(&scenario).map_err(Failure::input)?.duration_s() - LOOK_S)
+        }
+        _ => None,
+    };
+    let duration_s = args.duration.or(recorded_s).unwrap_or(DURATION_S);
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
+    let ego = in_the_middle(&road);
+    let (mut observer, mut rows) = (Observer::default(), Vec::new());
+    for k in 0..=(duration_s / LOOK_S) as i64 {
+        let now = Time::from_seconds(k as f64 * LOOK_S);
+        let scene = traffic.advance(now, &ego).map_err(Failure::work)?;
+        observer.look(scene, &road);
+        rows.extend(scene.neighbours.iter().map(|n| Row {
+            id: n.id,
+            time_s: now.seconds(),
+            x_m: n.x_m,
+            y_m: n.y_m,
+            yaw_rad: Some(n.yaw_rad),
+            speed_m_s: Some(n.speed_m_s),
+            length_m: Some(n.length_m()),
+            width_m: Some(n.width_m),
+            class: Some(n.class),
+        }));
+    }
+    if !rows.is_empty() {
+        let recording = Recording::from_rows("trajectories", Frame::Map, rows, LOOK_S)
+            .map_err(Failure::work)?;
+        let file = args.out.join("trajectories.parquet");
+        write_parquet(&file, &recording).map_err(Failure::work)?;
+    }
+    let manifest = traffic.manifest();
+    let text = manifest.to_toml().map_err(Failure::work)?;
+    write(&args.out.join("traffic.manifest.toml"), &text)?;
+    Ok(Driven {
+        samples: observer.samples,
+        lanes_m: traffic_client::calibrate::lanes_m(&road),
+        engine: manifest.engine,
+        mode: traffic.mode(),
+    })
+}
+
+/// Somebody to look from, who is not there.
+fn in_the_middle(road: &Road) -> EgoState {
+    let s_m = 0.5 * road.length_m();
+    let at = road.at(s_m, 0.0);
+    EgoState { s_m, x_m: at.x_m, y_m: at.y_m, yaw_rad: at.heading_rad, ..EgoState::default() }
+}
+
+/// The scenario with drivers like those of the recordings, on the recorded road; also written.
+fn calibrated(
+    args: &Args,
+    scenario: Scenario,
+    learned: &Measured,
+    seed: u64,
+) -> Result<Scenario, Failure> {
+    let (Some(road), Some(file)) = (learned.road(), learned.files.first()) else {
+        return Err(Failure::Input("--calibrate: no recording".to_owned()));
+    };
+    let effort = Effort { generations: args.generations, seed, ..Effort::default() };
+    output::note("calibrating ...");
+    let base = scenario.traffic.demand(seed);
+    let found = calibrate(road, &learned.recordings, &learned.samples, &base, effort)
+        .map_err(Failure::input)?;
+    let mut scenario = scenario;
+    scenario.name = format!("{}-calibrated", scenario.name);
+    scenario.description = format!(
+        "Native drivers calibrated to {} recordings: weighted distance {:.3} after {} trials.",
+        learned.recordings.len(),
+        found.distance,
+        found.trials
+    );
+    scenario.road = format!("recording:{}", args.lanes);
+    scenario.ego.s_m = scenario.ego.s_m.min(0.5 * road.length_m());
+    let traffic = &mut scenario.traffic;
+    (traffic.source, traffic.family, traffic.mode) = (TrafficKind::Native, None, None);
+    let absolute = std::fs::canonicalize(file).map_err(|e| Failure::file(file, e))?;
+    traffic.replay.file = Some(absolute.display().to_string());
+    traffic.replay.carriageway = args.carriageway.into();
+    traffic.native = found.config;
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
+    let text = toml::to_string(&scenario).map_err(Failure::work)?;
+    write(&args.out.join("calibrated.toml"), &text)?;
+    scenario.traffic.mode = Some(Mode::Pure);
+    Ok(scenario)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|e| Failure::file(path, e))
+}

@@ -1,0 +1,163 @@
+//! `statistics.json`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::Serialize;
+use sim::Scenario;
+use traffic_client::Mode;
+use traffic_client::stats::{
+    Moments, QUANTITIES, Samples, kolmogorov_smirnov, moments, wasserstein,
+};
+
+use super::Driven;
+use super::measured::Measured;
+use crate::provenance::Provenance;
+
+/// The whole file.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    #[serde(flatten)]
+    provenance: Provenance,
+    scenario: String,
+    road: String,
+    engine: String,
+    mode: Mode,
+    /// Recordings that the drivers were calibrated to.
+    calibrated_to: Vec<String>,
+    simulated: Figures,
+    /// All recordings together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measured: Option<Figures>,
+    /// Simulated against measured, by quantity.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    distances: Option<Distances>,
+    /// The same for each recording.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    recordings: Vec<OneRecording>,
+}
+
+#[derive(Debug, Serialize)]
+struct OneRecording {
+    file: String,
+    figures: Figures,
+    distances: Distances,
+    /// This recording against all others together: what recordings differ by among themselves.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    distances_to_other_recordings: Option<Distances>,
+}
+
+/// Traffic in numbers.
+#[derive(Debug, Serialize)]
+struct Figures {
+    duration_s: f64,
+    vehicles: usize,
+    driven_km: f64,
+    flow_per_lane_1_h: f64,
+    density_per_lane_1_km: f64,
+    lane_changes: usize,
+    lane_changes_per_vehicle_1_km: f64,
+    min_gap_m: f64,
+    #[serde(flatten)]
+    moments: BTreeMap<&'static str, Moments>,
+}
+
+type Distances = BTreeMap<&'static str, Distance>;
+
+/// How far two distributions lie apart.
+#[derive(Debug, Serialize)]
+struct Distance {
+    /// Kolmogorov-Smirnov, dimensionless.
+    ks: f64,
+    /// Wasserstein-1, in the unit of the quantity.
+    wasserstein: f64,
+}
+
+fn figures(s: &Samples, lanes_m: f64) -> Figures {
+    let of = |q, key| moments(s.of(q)).map(|m| (key, m));
+    Figures {
+        duration_s: s.duration_s,
+        vehicles: s.vehicles,
+        driven_km: s.driven_km,
+        flow_per_lane_1_h: s.flow_1_h(lanes_m),
+        density_per_lane_1_km: s.density_1_km(lanes_m),
+        lane_changes: s.lane_changes,
+        lane_changes_per_vehicle_1_km: s.lane_changes_1_km(),
+        min_gap_m: if s.min_gap_m.is_finite() { s.min_gap_m } else { 0.0 },
+        moments: QUANTITIES.iter().filter_map(|&(q, key, _)| of(q, key)).collect(),
+    }
+}
+
+fn distances(a: &Samples, b: &Samples) -> Distances {
+    let of = |q, key| {
+        let (ks, wasserstein) =
+            kolmogorov_smirnov(a.of(q), b.of(q)).zip(wasserstein(a.of(q), b.of(q)))?;
+        Some((key, Distance { ks, wasserstein }))
+    };
+    QUANTITIES.iter().filter_map(|&(q, key, _)| of(q, key)).collect()
+}
+
+impl Report {
+    pub(super) fn new(
+        scenario: &Scenario,
+        seed: u64,
+        driven: &Driven,
+        measured: &Measured,
+        calibrated_to: &[PathBuf],
+    ) -> Self {
+        let there = !measured.each.is_empty();
+        let recordings =
+            measured.files.iter().zip(&measured.each).enumerate().map(|(k, (f, s))| {
+                let mut others = Samples::default();
+                let rest = measured.each.iter().enumerate().filter(|&(j, _)| j != k);
+                rest.for_each(|(_, other)| others.append(other));
+                OneRecording {
+                    file: f.display().to_string(),
+                    figures: figures(s, measured.lanes_m),
+                    distances: distances(&driven.samples, s),
+                    distances_to_other_recordings: (measured.each.len() > 1)
+                        .then(|| distances(s, &others)),
+                }
+            });
+        Self {
+            provenance: Provenance::of_seed(seed),
+            scenario: scenario.name.clone(),
+            road: scenario.road.clone(),
+            engine: driven.engine.clone(),
+            mode: driven.mode,
+            calibrated_to: calibrated_to.iter().map(|p| p.display().to_string()).collect(),
+            simulated: figures(&driven.samples, driven.lanes_m),
+            measured: there.then(|| figures(&measured.samples, measured.lanes_m)),
+            distances: there.then(|| distances(&driven.samples, &measured.samples)),
+            recordings: recordings.collect(),
+        }
+    }
+
+    /// The result in a sentence.
+    pub(super) fn sentence(&self) -> String {
+        let s = &self.simulated;
+        let mean = |key| s.moments.get(key).map_or(0.0, |m| m.mean);
+        let mut text = format!(
+            "{}: {} vehicles, {:.1} vehicle-km in {:.0} s, {:.2} m/s, {:.0} vehicles per hour and \
+             lane, {:.1} per km and lane, {:.2} lane changes per vehicle-km, smallest gap {:.2} m",
+            self.engine,
+            s.vehicles,
+            s.driven_km,
+            s.duration_s,
+            mean("speed_m_s"),
+            s.flow_per_lane_1_h,
+            s.density_per_lane_1_km,
+            s.lane_changes_per_vehicle_1_km,
+            s.min_gap_m,
+        );
+        if let Some(distances) = &self.distances {
+            let all: Vec<String> = distances
+                .iter()
+                .map(|(key, d)| format!("{key} {:.3} ({:.2})", d.ks, d.wasserstein))
+                .collect();
+            text.push_str("; KS (Wasserstein) to measured: ");
+            text.push_str(&all.join(", "));
+        }
+        text
+    }
+}
