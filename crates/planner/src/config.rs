@@ -9,6 +9,7 @@ use crate::guard::GuardConfig;
 use crate::lane_change::LaneChangeConfig;
 use crate::lateral::LateralConfig;
 use crate::longitudinal::LongitudinalConfig;
+use crate::pcc::horizon::HorizonConfig;
 use crate::rss::RssConfig;
 use serde::{Deserialize, Serialize};
 
@@ -84,6 +85,8 @@ pub struct StackConfig {
     pub decider: DeciderKind,
     /// Who sets the reference speed.
     pub speed_planner: SpeedPlannerKind,
+    /// Horizon of the predictive speed planner.
+    pub speed_plan: HorizonConfig,
     /// Speed limits of the road count.
     pub obey_speed_limits: bool,
     /// Largest lateral acceleration in curves, m/s².
@@ -113,6 +116,7 @@ impl Default for StackConfig {
             set_speed_m_s: 20.0,
             decider: DeciderKind::default(),
             speed_planner: SpeedPlannerKind::default(),
+            speed_plan: HorizonConfig::default(),
             obey_speed_limits: true,
             curve_accel_m_s2: 1.5,
             rates: RatesConfig::default(),
@@ -147,6 +151,7 @@ impl StackConfig {
         }
         let remainder = f64::from(r.decision_ticks % r.path_ticks);
         config_in("rates.decision_ticks modulo path_ticks", remainder, 0.0, 0.0)?;
+        self.speed_plan.check()?;
         self.rss.check()?;
         self.following.check()?;
         self.lane_change.check()?;

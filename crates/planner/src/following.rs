@@ -103,6 +103,18 @@ pub struct Following {
     pub emergency: bool,
 }
 
+/// Gap that is kept behind `lead` at its speed, m: headway, and the safe gap with its margin.
+#[must_use]
+pub fn steady_gap_m(config: &FollowingConfig, ego: &RearResponse, lead: &Lead) -> f64 {
+    let v = lead.speed_m_s.max(0.0);
+    let safe_m = SafeGap::new(ego, lead.brake_max_m_s2, 0.0).gap_m(v, v);
+    wanted_gap_m(config, v * config.headway_s, safe_m)
+}
+
+fn wanted_gap_m(config: &FollowingConfig, headway_m: f64, safe_m: f64) -> f64 {
+    (config.standstill_gap_m + headway_m.max(0.0)).max(safe_m + config.safe_gap_margin_m)
+}
+
 /// Largest acceleration that keeps the gap to `lead`, at own `speed_m_s` on `grade_rad`.
 #[must_use]
 pub fn follow(
@@ -119,8 +131,7 @@ pub fn follow(
 
     let (a, b) = (config.accel_m_s2, config.comfort_decel_m_s2);
     let approach = v * (v - v_f) / (2.0 * libm::sqrt(a * b));
-    let wanted = config.standstill_gap_m + (v * config.headway_s + approach).max(0.0);
-    let wanted = wanted.max(d_safe + config.safe_gap_margin_m);
+    let wanted = wanted_gap_m(config, v * config.headway_s + approach, d_safe);
     let ratio = wanted / gap.max(0.1);
     let idm = a * (1.0 - ratio * ratio);
 

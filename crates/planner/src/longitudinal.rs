@@ -14,6 +14,12 @@ use crate::road_load::{InGear, effective_mass_kg, resistance_n};
 use serde::{Deserialize, Serialize};
 use tractrix_core::{BrakeMode, EgoState, VehicleLimits};
 
+/// A rolling truck is this much faster or slower than its reference before it brakes or drives,
+/// m/s. The next plan starts from where it is.
+const COAST_FAST_M_S: f64 = 0.3;
+/// See [`COAST_FAST_M_S`].
+const COAST_SLOW_M_S: f64 = 0.5;
+
 /// Speed-control parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -87,6 +93,8 @@ pub struct SpeedTarget {
     pub traffic_accel_m_s2: f64,
     /// Grade at the truck, rad, mean over its length.
     pub grade_rad: f64,
+    /// The reference is made for rolling on without fuel and brake.
+    pub coast: bool,
 }
 
 /// Pedal, retarder and brake of one control step.
@@ -102,6 +110,8 @@ pub struct SpeedCommand {
     pub brake_mode: BrakeMode,
     /// The acceleration that is asked for, m/s².
     pub accel_m_s2: f64,
+    /// Traffic sets it, not the reference.
+    pub traffic_rules: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -120,6 +130,7 @@ pub struct LongitudinalController {
     service_brake: bool,
     pedal_frac: f64,
     switches: u32,
+    coasting: bool,
 }
 
 impl LongitudinalController {
@@ -134,6 +145,7 @@ impl LongitudinalController {
             service_brake: false,
             pedal_frac: 0.0,
             switches: 0,
+            coasting: false,
         }
     }
 
@@ -159,6 +171,11 @@ impl LongitudinalController {
         let wanted = target.accel_m_s2 + c.gain_1_s * error + self.integral_m_s2;
         let cruise = wanted.clamp(-c.decel_max_m_s2, c.accel_max_m_s2);
         let accel = cruise.min(target.traffic_accel_m_s2);
+        let traffic_rules = accel < cruise;
+        self.coasting = target.coast && self.may_coast(error, target, ego.accel_x_m_s2);
+        if self.coasting {
+            return self.roll(dt_s, accel);
+        }
 
         let mass = effective_mass_kg(limits, &in_gear);
         let force = mass * accel + resistance_n(&limits.road_load, ego.speed_m_s, target.grade_rad);
@@ -181,7 +198,7 @@ impl LongitudinalController {
         let at_end = (force > in_gear.max_force_n() && error > 0.0)
             || (self.actuator == Actuator::Drive && force < coast && error < 0.0)
             || wanted != cruise
-            || accel < cruise;
+            || traffic_rules;
         if !at_end && !signals.shift_in_progress && signals.gear > 0 {
             let slope = c.gain_1_s / c.integral_time_s * error;
             self.integral_m_s2 = (self.integral_m_s2 + slope * dt_s)
@@ -193,6 +210,29 @@ impl LongitudinalController {
             xbr_decel_m_s2: xbr,
             brake_mode: if xbr > 0.0 { BrakeMode::Maximum } else { BrakeMode::Off },
             accel_m_s2: accel,
+            traffic_rules,
+        }
+    }
+
+    /// Whether the truck may roll on: near enough to the reference, a little too fast less than too
+    /// slow, and traffic does not ask for more than rolling gives.
+    fn may_coast(&self, error_m_s: f64, target: &SpeedTarget, accel_m_s2: f64) -> bool {
+        let room = if self.coasting { 1.0 } else { 0.5 };
+        error_m_s > -COAST_FAST_M_S * room
+            && error_m_s < COAST_SLOW_M_S * room
+            && target.traffic_accel_m_s2 > accel_m_s2 - self.config.band_m_s2
+    }
+
+    /// Neither pedal nor brake; the integrator rests.
+    fn roll(&mut self, dt_s: f64, accel_m_s2: f64) -> SpeedCommand {
+        self.in_actuator_s += dt_s;
+        self.actuator = Actuator::Drive;
+        self.service_brake = false;
+        self.pedal_frac = (self.pedal_frac - self.config.pedal_rate_1_s * dt_s).max(0.0);
+        SpeedCommand {
+            accelerator_pedal_frac: self.pedal_frac,
+            accel_m_s2,
+            ..SpeedCommand::default()
         }
     }
 

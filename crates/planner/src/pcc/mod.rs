@@ -21,6 +21,9 @@
 //! | [`gears`] | shift places along a profile |
 //! | [`sqp`] | the iteration |
 //! | [`trip`] | whole trips against both baselines |
+//! | [`horizon`] | the next kilometres, renewed while driving |
+//! | [`horizon_time`] | trip-time controller: the price of a second |
+//! | [`horizon_fence`] | staying behind a vehicle ahead |
 //!
 //! Left out: wind, torque build-up, and the speed lost during a shift (charged as fuel).
 
@@ -31,6 +34,10 @@ pub mod cruise;
 pub mod drive;
 mod error;
 pub mod gears;
+pub mod horizon;
+pub mod horizon_fence;
+mod horizon_setting;
+pub mod horizon_time;
 pub mod lin;
 pub mod quadratic;
 pub mod search;

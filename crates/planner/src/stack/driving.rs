@@ -2,10 +2,11 @@
 
 use alloc::vec::Vec;
 
+use super::speed::{Ahead, Doing};
 use super::{Stack, grade, wrapped};
 use crate::SpeedPlannerKind;
 use crate::decider::{DeciderKind, LaneChoice, View, lane_ends, leave_ending_lane, mobil, rules};
-use crate::following::{Following, follow};
+use crate::following::{Following, follow, steady_gap_m};
 use crate::lateral::{PREVIEW_POINTS, PREVIEW_STEP_S, PathError};
 use crate::lateral_model::LOWEST_SPEED_M_S;
 use crate::leads::{LeadView, leads};
@@ -13,6 +14,7 @@ use crate::longitudinal::SpeedTarget;
 use crate::maneuver::{ManeuverPlanner, Situation};
 use crate::observation;
 use crate::path::{Lateral, LateralPath};
+use crate::pcc::horizon_fence::LeadAhead;
 use crate::reference_speed::SpeedBounds;
 use road::{LaneKind, Road};
 use tractrix_core::{
@@ -47,6 +49,7 @@ impl Stack {
             ),
         };
         if due(rates.path_ticks) || self.reference.points().is_empty() {
+            self.plan_speed(now, ego, scene, road, limits, &maneuver);
             self.update_reference(ego, road, maneuver.path().lane, limits);
         }
         let grade_rad = grade(road, ego, limits);
@@ -73,18 +76,60 @@ impl Stack {
             let (speed_m_s, accel_m_s2) = planned.unwrap_or((reference_m_s, reference_accel));
             self.plan.following = following.map(|(id, _)| id);
             self.plan.reference_speed_m_s = reference_m_s;
+            let doing = Doing {
+                reference_m_s: speed_m_s,
+                free: planned.is_none(),
+                braking: self.guard.sent().retarder_frac > 0.3
+                    || self.guard.sent().xbr_decel_m_s2 > 0.0,
+            };
             let target = SpeedTarget {
                 speed_m_s,
                 accel_m_s2,
                 traffic_accel_m_s2: following.map_or(f64::INFINITY, |(_, f)| f.accel_m_s2),
                 grade_rad,
+                coast: self.plans_ahead() && self.speed.coasts(ego.s_m, &doing),
             };
-            self.control(ego, maneuver.path(), &target, road, limits)
+            self.control(ego, maneuver.path(), &target, doing, road, limits)
         } else {
             *self.guard.sent()
         };
         self.maneuver = Some(maneuver);
         Some(command)
+    }
+
+    /// Whether the speed is planned while driving.
+    fn plans_ahead(&self) -> bool {
+        self.config.speed_planner == SpeedPlannerKind::Predictive && self.profile.is_none()
+    }
+
+    /// Plans the speed of the next kilometres, if it is time to.
+    fn plan_speed(
+        &mut self,
+        now: Time,
+        ego: &EgoState,
+        scene: &Scene,
+        road: &Road,
+        limits: &VehicleLimits,
+        maneuver: &ManeuverPlanner,
+    ) {
+        if !self.plans_ahead() {
+            return;
+        }
+        let view = LeadView { ego, scene, road, limits, rss: &self.config.rss };
+        let response = self.config.rss.ego_response(limits);
+        let lead = leads(&view, maneuver)
+            .into_iter()
+            .flatten()
+            .filter(|lead| lead.in_path && !lead.being_left)
+            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+            .map(|lead| LeadAhead {
+                id: lead.id,
+                gap_m: lead.gap_m,
+                speed_m_s: lead.speed_m_s,
+                wanted_gap_m: steady_gap_m(&self.config.following, &response, &lead),
+            });
+        let ahead = Ahead { now, ego, road, lane: maneuver.path().lane, limits, lead };
+        self.speed.update(self.ticks, &self.config, &ahead);
     }
 
     fn update_reference(&mut self, ego: &EgoState, road: &Road, lane: u16, limits: &VehicleLimits) {
@@ -97,10 +142,15 @@ impl Stack {
             SpeedPlannerKind::Predictive => self.profile.as_ref(),
             SpeedPlannerKind::Cruise => None,
         };
-        let planned = |s_m: f64| profile.and_then(|p| p.at(s_m));
+        let ahead = self.plans_ahead().then_some(&self.speed);
+        let planned = |s_m: f64| match ahead {
+            Some(speed) => speed.at(s_m).map(|p| p.speed_m_s),
+            None => profile.and_then(|p| p.at(s_m)),
+        };
         self.reference.update(road, lane, ego.s_m, &limits.geometry, &bounds, planned);
         self.plan.speed_status = match (self.config.speed_planner, profile) {
             (SpeedPlannerKind::Cruise, _) => PlanStatus::Cruise,
+            (SpeedPlannerKind::Predictive, None) => self.speed.status(ego.s_m),
             (SpeedPlannerKind::Predictive, Some(p)) if p.at(ego.s_m).is_some() => p.status(),
             (SpeedPlannerKind::Predictive, _) => PlanStatus::Fallback,
         };
@@ -158,11 +208,21 @@ impl Stack {
         ego: &EgoState,
         path: &LateralPath,
         target: &SpeedTarget,
+        doing: Doing,
         road: &Road,
         limits: &VehicleLimits,
     ) -> Command {
         let dt_s = self.config.rates.control_s();
         let speed = self.longitudinal.step(dt_s, ego, target, limits);
+        let gear = if self.plans_ahead() {
+            if speed.traffic_rules {
+                self.speed.held_up();
+            }
+            let doing = Doing { free: doing.free && !speed.traffic_rules, ..doing };
+            self.speed.gear(dt_s, &self.config, ego, limits, &doing)
+        } else {
+            GearRequest::Automatic
+        };
         let (error, wheel_rad) = self.steer(ego, path, road, limits);
         self.plan.target_speed_m_s = target.speed_m_s;
         self.plan.target_accel_m_s2 = speed.accel_m_s2;
@@ -174,7 +234,7 @@ impl Stack {
             brake_mode: speed.brake_mode,
             steering_wheel_rad: wheel_rad * limits.lateral.steering_ratio,
             retarder_frac: speed.retarder_frac,
-            gear: GearRequest::Automatic,
+            gear,
         }
     }
 

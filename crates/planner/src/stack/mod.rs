@@ -1,6 +1,7 @@
 //! The planning stack: decide, plan speed, plan path, control, guard.
 
 mod driving;
+mod speed;
 
 use alloc::sync::Arc;
 
@@ -13,9 +14,11 @@ use crate::limits_check::check_limits;
 use crate::longitudinal::LongitudinalController;
 use crate::maneuver::ManeuverPlanner;
 use crate::observation::Observer;
+use crate::pcc::horizon::{HorizonFailure, HorizonPlan};
 use crate::reference_speed::ReferenceSpeed;
 use crate::{PlannerError, SpeedProfile, StackConfig};
 use road::Road;
+use speed::SpeedPlanning;
 use tractrix_core::{EgoState, Maneuver, Plan, Scene, Stamped, Time, VehicleLimits};
 
 /// The planning stack of one truck.
@@ -35,6 +38,7 @@ pub struct Stack {
     policy: Option<Arc<Policy>>,
     observer: Observer,
     profile: Option<SpeedProfile>,
+    speed: SpeedPlanning,
     estimator: LoadEstimator,
     /// The truck's limits with the estimated load, once there is a valid estimate.
     estimated: Option<VehicleLimits>,
@@ -87,6 +91,7 @@ impl Stack {
             policy,
             observer: Observer::new(rates.tick_s * f64::from(rates.path_ticks)),
             profile: None,
+            speed: SpeedPlanning::new(&config),
             estimator: LoadEstimator::new(config.estimator, &limits.road_load),
             estimated: None,
             plan: Plan::default(),
@@ -119,11 +124,36 @@ impl Stack {
         }
     }
 
-    /// Gives the stack a planned speed profile (speed planner `predictive`); it replaces the former
-    /// one. Where it has no speed, and without one, the set speed is the reference and the plan's
-    /// status is [`tractrix_core::PlanStatus::Fallback`].
+    /// Gives the stack a speed profile that was planned ahead of time (speed planner `predictive`,
+    /// the paper's way); it replaces the former one and planning while driving. Where it has no
+    /// speed the set speed is the reference and the plan's status is
+    /// [`tractrix_core::PlanStatus::Fallback`]. `None` goes back to planning while driving.
     pub fn set_speed_profile(&mut self, profile: Option<SpeedProfile>) {
         self.profile = profile;
+    }
+
+    /// The last plan of the predictive speed planner, made while driving.
+    #[must_use]
+    pub fn speed_plan(&self) -> Option<&HorizonPlan> {
+        self.speed.last()
+    }
+
+    /// Why the last attempt to plan the speed brought none; `None` if it did.
+    #[must_use]
+    pub fn speed_plan_failure(&self) -> Option<&HorizonFailure> {
+        self.speed.failure()
+    }
+
+    /// Speed plans made so far while driving.
+    #[must_use]
+    pub fn speed_plans_made(&self) -> u64 {
+        self.speed.made()
+    }
+
+    /// Lateness against cruise control at the set speed, s; time lost behind traffic not counted.
+    #[must_use]
+    pub fn speed_plan_late_s(&self) -> f64 {
+        self.speed.late_s()
     }
 
     /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick.
