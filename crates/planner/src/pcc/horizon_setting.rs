@@ -122,11 +122,11 @@ impl Setting {
         let start_e = 0.5 * request.speed_m_s * request.speed_m_s;
         // A truck that is too fast slows down as lower limits are approached.
         let mut e = start_e;
-        for k in 0..=course.n() {
-            if e <= e_max[k] {
+        for (k, ceiling) in e_max.iter_mut().enumerate() {
+            if e <= *ceiling {
                 break;
             }
-            e_max[k] = e;
+            *ceiling = e;
             let i = k.min(course.n() - 1);
             let held = course.brake_m_s2 + truck.resistance_m_s2(e, course.sin[i], course.cos[i]);
             e -= 0.8 * (0.9 * held).min(approach).max(0.01) * course.h_m;
