@@ -61,17 +61,34 @@ pub enum FindingKind {
     ClockOffset {
         /// The channel that it was compared with.
         against: String,
-        /// Lag of the channel behind the other, s.
+        /// Lag of the channel behind the other, s, beyond the delay of a held signal.
         seconds: f64,
+        /// Standard deviation of the lag, s.
+        sigma_s: f64,
+        /// End of the stretch with this lag, s in the drive's time.
+        until_s: f64,
     },
-    /// The lag between two channels changes along the drive.
+    /// The lag between two channels changes steadily along a stretch of the drive.
     ClockDrift {
         /// The channel that it was compared with.
         against: String,
-        /// Lag in the first and in the last part, s.
+        /// Lag at the begin of the stretch, s.
         first_s: f64,
-        /// Lag in the last part, s.
+        /// Lag at its end, s.
         last_s: f64,
+        /// Standard deviation of the change, s.
+        sigma_s: f64,
+    },
+    /// The lag between two channels jumps.
+    ClockJump {
+        /// The channel that it was compared with.
+        against: String,
+        /// Lag before, s.
+        before_s: f64,
+        /// Lag after, s.
+        after_s: f64,
+        /// Standard deviation of the jump, s.
+        sigma_s: f64,
     },
     /// The index names another truck than the truck file.
     TruckName {

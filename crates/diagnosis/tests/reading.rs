@@ -73,3 +73,28 @@ fn an_empty_table_and_a_missing_index_are_errors() {
         Err(DiagnosisError::Io { .. })
     ));
 }
+
+#[test]
+fn a_receiver_whose_clock_is_late_is_reported_with_its_lag() {
+    let dir = tempfile::tempdir().unwrap();
+    let v =
+        |t: f64| 18.0 + 3.0 * (0.21 * t).sin() + 1.3 * (0.057 * t).cos() + 2.0 * (0.013 * t).sin();
+    let mut csv = "time_s,speed_m_s,gps_speed_m_s\n".to_owned();
+    for t in (0..12_000).map(|i| f64::from(i) * 0.05) {
+        csv += &format!("{t},{:.3},{:.3}\n", v(t), v(t - 2.4));
+    }
+    write(dir.path(), "d.csv", &csv);
+    write(
+        dir.path(),
+        "drives.toml",
+        "schema = 1\ntruck = \"reference\"\n[[drive]]\nname = \"d\"\nfile = \"d.csv\"\n",
+    );
+    let found = read_drives(dir.path()).unwrap().findings;
+    let lag = found.iter().find_map(|f| match &f.kind {
+        FindingKind::ClockOffset { against, seconds, .. } if against == "speed_m_s" => {
+            Some(*seconds)
+        }
+        _ => None,
+    });
+    assert!((lag.unwrap() - 2.4).abs() < 0.05, "{found:?}");
+}

@@ -83,6 +83,7 @@ pub fn read_drives(dir: &Path) -> Result<DriveSet, DiagnosisError> {
             drive.map = Some(road_map(&dir.join(map))?);
             grid::fill_from_map(&mut drive);
         }
+        crate::clock::check(&drive, &mut set.findings);
         set.drives.push(drive);
     }
     Ok(set)
