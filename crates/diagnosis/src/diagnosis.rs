@@ -11,7 +11,7 @@ use crate::report_models::Models;
 use crate::search::Fit;
 use crate::sentence;
 use crate::unknown::Shape;
-use crate::{DiagnosisError, DriveSet, Executor, Finding, Plant};
+use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Plant};
 
 /// What the search concludes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -288,7 +288,10 @@ pub fn diagnose(
 }
 
 /// Indices of drives to learn from and to hold out.
-fn split(set: &DriveSet, hold_out: &[String]) -> Result<(Vec<usize>, Vec<usize>), DiagnosisError> {
+pub(crate) fn split(
+    set: &DriveSet,
+    hold_out: &[String],
+) -> Result<(Vec<usize>, Vec<usize>), DiagnosisError> {
     let n = set.drives.len();
     for name in hold_out {
         if !set.drives.iter().any(|d| d.name == *name) {
@@ -467,6 +470,12 @@ fn gain(
 /// Root mean square of the measured signal of a module over its rows.
 fn signal_rms(problem: &Problem<'_>, m: Module) -> f64 {
     let step = m.row_step();
+    if m == Module::Shift {
+        return rms(problem.drives.iter().flat_map(|d| &d.shifts).map(|s| {
+            let duration_s = s.1 as f64 * Drive::STEP_S;
+            [duration_s * duration_s, 1.0]
+        }));
+    }
     rms(problem.drives.iter().map(|d| {
         let x = d.measured(m);
         d.valid[m as usize]

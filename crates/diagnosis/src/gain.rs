@@ -5,7 +5,7 @@ use crate::Plant;
 use crate::param::Theta;
 use crate::problem::replay;
 use crate::replay::force::Longitudinal;
-use crate::replay::{Module, Prepared};
+use crate::replay::{Module, Prepared, fuel_noise_g_s};
 
 /// Length of a rollout, s.
 pub(crate) const HORIZON_S: f64 = 60.0;
@@ -28,6 +28,16 @@ pub(crate) struct DriveError {
 /// Free runs of the speed over [`HORIZON_S`] with measured torque, gear and pressure; shifts carry
 /// the measured change of speed.
 pub(crate) fn drive_error(d: &Prepared, plant: &Plant, theta: &Theta) -> DriveError {
+    drive_error_by(d, plant, theta, &mut |_, _| {})
+}
+
+/// The same; `visit` sees every sample of the free runs and the speed there, m/s.
+pub(crate) fn drive_error_by(
+    d: &Prepared,
+    plant: &Plant,
+    theta: &Theta,
+    visit: &mut dyn FnMut(usize, f64),
+) -> DriveError {
     let mut e = DriveError::default();
     if d.available[Module::Force as usize] {
         let model = Longitudinal::new(d, plant, theta);
@@ -47,6 +57,7 @@ pub(crate) fn drive_error(d: &Prepared, plant: &Plant, theta: &Theta) -> DriveEr
                 e.speed[1] += 1.0;
                 e.speed_sum += error;
                 e.speed_power += d.speed[i + 1] * d.speed[i + 1];
+                visit(i + 1, v);
             }
             start += steps;
         }
@@ -63,7 +74,7 @@ pub(crate) fn drive_error(d: &Prepared, plant: &Plant, theta: &Theta) -> DriveEr
     {
         if *ok {
             let measured = d.fuel[4 * k..4 * k + 4].iter().sum::<f64>() * 0.25;
-            e.fuel[0] -= x * (0.03 + 0.01 * measured);
+            e.fuel[0] -= x * fuel_noise_g_s(measured);
             e.fuel[1] += measured;
         }
     }

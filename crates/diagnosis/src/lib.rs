@@ -20,6 +20,7 @@ mod plausible;
 mod problem;
 mod read;
 mod replay;
+pub mod report;
 mod report_models;
 mod search;
 mod sentence;

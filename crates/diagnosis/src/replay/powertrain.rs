@@ -95,7 +95,12 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 }
                 modelled += 0.25 * rate;
             }
-            (measured - modelled) / (0.03 + 0.01 * measured)
+            (measured - modelled) / noise_g_s(measured)
         })
         .collect()
+}
+
+/// Noise of a fuel rate, g/s: a constant part and one percent of the rate.
+pub(crate) fn noise_g_s(rate_g_s: f64) -> f64 {
+    0.03 + 0.01 * rate_g_s
 }

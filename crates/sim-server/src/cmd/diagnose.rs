@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
+use diagnosis::report::Report;
 use diagnosis::{Diagnosis, DriveSet, Extension, Options, Plant, Verdict};
 use dynamics::TruckParameters;
 use serde_json::Value;
@@ -12,12 +13,13 @@ use crate::output;
 use crate::progress::Stages;
 use crate::provenance::Provenance;
 
+mod report;
 mod threads;
 
 use threads::Threads;
 
 /// Finds what the simulation gets wrong on measured drives and names the cause. Writes
-/// diagnosis.json and the extended truck file.
+/// diagnosis.json, report.html and the extended truck file.
 #[derive(Debug, Parser)]
 pub(crate) struct Args {
     /// The truck file that the simulation uses, or a built-in name.
@@ -33,6 +35,9 @@ pub(crate) struct Args {
     /// Drives on which the gain is measured [default: the last quarter, if there are four].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     hold_out: Vec<String>,
+    /// Seed of the intervals of the gain.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
     /// Folder of the results.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -57,16 +62,33 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         &Threads::available(),
         &mut |p| stages.show(&stage(p)),
     );
-    stages.finish();
     let mut found = found.map_err(Failure::input)?;
+    stages.show("drawing the report");
+    let figures =
+        diagnosis::report::report(&plant, &drives, baseline.as_ref(), &options, &found, args.seed)
+            .map_err(Failure::work)?;
+    stages.finish();
 
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
     let extension = write_extension(args, &truck, &mut found)?;
-    let json = to_json(&found, &extension)?;
+    let json = to_json(args, &found, &extension, &figures)?;
     let text = serde_json::to_string_pretty(&json).map_err(Failure::work)?;
     write(&args.out.join("diagnosis.json"), &text)?;
-    output::result(&if args.json { text } else { sentences(&found, &extension, &args.out) });
+    let overlay = extension.overlay.as_ref().map(toml::to_string).transpose();
+    let overlay = overlay.map_err(Failure::work)?;
+    let page = report::page(&found, &json, &figures, &named(&args.drives), overlay.as_deref());
+    write(&args.out.join("report.html"), &page)?;
+    output::result(&if args.json {
+        text
+    } else {
+        sentences(&found, &extension, &figures, &args.out)
+    });
     Ok(())
+}
+
+/// The last part of a path, for people.
+fn named(path: &Path) -> String {
+    path.file_name().map_or_else(|| "drives".to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
 fn read(folder: &Path) -> Result<DriveSet, Failure> {
@@ -102,11 +124,7 @@ fn write_extension(
     let name = file_name(&truck.name);
     let built_in = TruckParameters::names().any(|n| n == args.truck);
     let base = if built_in { args.truck.clone() } else { format!("{name}.base.toml") };
-    let origin = format!(
-        "diagnosis of {} on {}",
-        found.truck,
-        args.drives.file_name().map_or_else(|| "drives".into(), |n| n.to_string_lossy())
-    );
+    let origin = format!("diagnosis of {} on {}", found.truck, named(&args.drives));
     let extension =
         diagnosis::extend(truck, &base, &format!("{name}.extended"), &found.causes, &origin);
     found.extended_truck = extension.overlay.as_ref().map(|_| format!("{name}.extended.toml"));
@@ -129,8 +147,13 @@ fn file_name(name: &str) -> String {
 }
 
 /// `diagnosis.json`: the diagnosis with its provenance in front.
-fn to_json(found: &Diagnosis, extension: &Extension) -> Result<Value, Failure> {
-    let mut json = serde_json::to_value(Provenance::of_seed(0)).map_err(Failure::work)?;
+fn to_json(
+    args: &Args,
+    found: &Diagnosis,
+    extension: &Extension,
+    figures: &Report,
+) -> Result<Value, Failure> {
+    let mut json = serde_json::to_value(Provenance::of_seed(args.seed)).map_err(Failure::work)?;
     let rest = serde_json::to_value(found).map_err(Failure::work)?;
     if let (Some(all), Value::Object(rest)) = (json.as_object_mut(), rest) {
         all.extend(rest);
@@ -140,36 +163,46 @@ fn to_json(found: &Diagnosis, extension: &Extension) -> Result<Value, Failure> {
             .map(|n| serde_json::json!({ "id": n.id, "why": n.why }))
             .collect();
         all.insert("not_carried".to_owned(), lost.into());
+        if let Some(Value::Object(gain)) = all.get_mut("gain") {
+            let errors = serde_json::to_value(&figures.gains).map_err(Failure::work)?;
+            gain.insert("errors".to_owned(), errors);
+        }
     }
     Ok(json)
 }
 
 /// The diagnosis for a terminal.
-fn sentences(found: &Diagnosis, extension: &Extension, out: &Path) -> String {
+fn sentences(found: &Diagnosis, extension: &Extension, figures: &Report, out: &Path) -> String {
     let mut lines = vec![verdict(found)];
     for cause in &found.causes {
         lines.push(format!("  {} (evidence {:.0} nats)", cause.sentence, cause.evidence));
+        lines.push(format!("    {}", diagnosis::report::advice(cause.id)));
         for other in &cause.confused_with {
             lines.push(format!("    could be {}: {}", other.id, other.why));
         }
     }
     if let Some(u) = &found.unknown {
-        lines.push(format!(
-            "  outside the catalogue: {}; it follows {}",
-            u.shape,
-            u.signals.join(", ")
-        ));
+        let signals = u.signals.join(", ");
+        lines.push(format!("  outside the catalogue: {}; it follows {signals}", u.shape));
     }
     if let Some(g) = &found.gain {
-        let claim = if g.significant { "" } else { " (not significant)" };
-        lines.push(format!(
-            "Held-out drives {}: speed over 60 s {:.2} to {:.2} m/s, fuel {:.1} to {:.1} %{claim}",
-            g.held_out.join(", "),
-            g.speed_rmse_m_s.before,
-            g.speed_rmse_m_s.after,
-            100.0 * g.fuel_error_frac.before,
-            100.0 * g.fuel_error_frac.after,
-        ));
+        let held_out = g.held_out.join(", ");
+        let mut claimed = figures.gains.iter().filter(|g| g.claimed).peekable();
+        if claimed.peek().is_none() {
+            lines.push(format!("No error falls significantly on {held_out}: no gain is claimed."));
+        }
+        for e in claimed {
+            lines.push(format!(
+                "  {} on {held_out}: error {:.3} to {:.3} ({}), {:.0} % less ({:.0} to {:.0} %)",
+                e.title,
+                e.before,
+                e.after,
+                e.quantity,
+                100.0 * e.fall_frac,
+                100.0 * e.fall_frac_interval[0],
+                100.0 * e.fall_frac_interval[1],
+            ));
+        }
     }
     for n in &extension.not_carried {
         lines.push(format!("Not in the extended truck: {} ({})", n.id, n.why));
@@ -177,7 +210,7 @@ fn sentences(found: &Diagnosis, extension: &Extension, out: &Path) -> String {
     if !found.tolerances_from_baseline {
         lines.push("Without a baseline the tolerances are defaults.".to_owned());
     }
-    lines.push(format!("Results are in {}", out.display()));
+    lines.push(format!("Report: {}", out.join("report.html").display()));
     lines.join("\n")
 }
 
