@@ -4,6 +4,9 @@
 //! tolerances of that drive (load sheet, weather, instruments), scaled by their standard
 //! deviations. Everything that the search needs is a Gram matrix in `M`, kept per drive.
 
+use std::collections::HashMap;
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::param::{P, PARAMS, SPECS, Theta};
@@ -28,6 +31,13 @@ pub(crate) struct Reference {
 /// Whitened columns per module; empty where zero.
 pub(crate) type Column = [Vec<f64>; MODULES];
 
+/// Raw sensitivities already replayed, by direction and by the parameters of the groups that they
+/// touch: modules do not see each other's parameters.
+type Replayed = std::sync::Mutex<HashMap<Vec<u64>, Arc<Column>>>;
+
+/// Most sensitivities kept per drive.
+const KEPT: usize = 160;
+
 struct Nuisance {
     /// Residuals at the reference, and whitened.
     base: Residuals,
@@ -42,6 +52,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) drives: Vec<Prepared>,
     pub(crate) reference: Reference,
     nuisance: Vec<Nuisance>,
+    replayed: Vec<Replayed>,
     executor: &'a dyn Executor,
 }
 
@@ -149,7 +160,9 @@ impl<'a> Problem<'a> {
         let theta = [0.0; PARAMS];
         let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
         let reference = Reference::start(&drives, &residuals, theta);
-        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), executor };
+        let replayed = drives.iter().map(|_| Replayed::default()).collect();
+        let mut problem =
+            Self { plant, drives, reference, nuisance: Vec::new(), replayed, executor };
         problem.refresh()?;
         for round in 0..3 {
             if clean || round > 0 {
@@ -214,7 +227,9 @@ impl<'a> Problem<'a> {
         reference: Reference,
         executor: &'a dyn Executor,
     ) -> Result<Self, DiagnosisError> {
-        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), executor };
+        let replayed = drives.iter().map(|_| Replayed::default()).collect();
+        let mut problem =
+            Self { plant, drives, reference, nuisance: Vec::new(), replayed, executor };
         problem.refresh()?;
         Ok(problem)
     }
@@ -282,24 +297,53 @@ impl<'a> Problem<'a> {
 
     /// Whitened sensitivity: minus the derivative of the residual along the direction.
     fn column(&self, i: usize, theta: &Theta, base: &Residuals, direction: &Direction) -> Column {
+        let raw = self.raw(i, theta, base, direction);
+        core::array::from_fn(|m| {
+            if raw[m].is_empty() {
+                return Vec::new();
+            }
+            self.reference.whiteners[m].apply(&raw[m], &self.drives[i].valid[m])
+        })
+    }
+
+    /// The sensitivity before whitening.
+    fn raw(&self, i: usize, theta: &Theta, base: &Residuals, direction: &Direction) -> Arc<Column> {
         let d = &self.drives[i];
         let mut t = *theta;
         for (p, v) in &direction.shape {
             t[*p as usize] = *v;
         }
+        let groups = affects(direction.p);
+        let mut key = vec![direction.p as u64, direction.step.to_bits()];
+        key.extend(
+            SPECS
+                .iter()
+                .filter(|s| affects(s.p).iter().any(|g| groups.contains(g)))
+                .flat_map(|s| [theta[s.p as usize].to_bits(), t[s.p as usize].to_bits()]),
+        );
+        if let Ok(kept) = self.replayed[i].lock()
+            && let Some(column) = kept.get(&key)
+        {
+            return column.clone();
+        }
         t[direction.p as usize] += direction.step;
         let mut moved = Residuals::default();
-        for g in affects(direction.p) {
+        for g in groups {
             replay_group(d, self.plant, &t, *g, &mut moved);
         }
-        core::array::from_fn(|m| {
-            if moved[m].is_empty() {
-                return Vec::new();
+        for (moved, base) in moved.iter_mut().zip(base) {
+            for (x, b) in moved.iter_mut().zip(base) {
+                *x = (b - *x) / direction.step;
             }
-            let difference: Vec<f64> =
-                base[m].iter().zip(&moved[m]).map(|(b, x)| (b - x) / direction.step).collect();
-            self.reference.whiteners[m].apply(&difference, &d.valid[m])
-        })
+        }
+        let column = Arc::new(moved);
+        if let Ok(mut kept) = self.replayed[i].lock() {
+            if kept.len() >= KEPT {
+                kept.clear();
+            }
+            kept.insert(key, column.clone());
+        }
+        column
     }
 
     /// Gram matrix of the residual at `theta` and the directions from there, and the raw
@@ -455,5 +499,18 @@ pub(crate) fn replay(d: &Prepared, plant: &Plant, theta: &Theta) -> Residuals {
 }
 
 fn dot(a: &Column, b: &Column) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>()).sum()
+    a.iter().zip(b).map(|(a, b)| inner(a, b)).sum()
+}
+
+/// Inner product with eight running sums, so that the compiler may use wide registers.
+fn inner(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (mut sums, whole) = ([0.0; 8], n - n % 8);
+    for (x, y) in a[..whole].chunks_exact(8).zip(b[..whole].chunks_exact(8)) {
+        for (s, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *s += x * y;
+        }
+    }
+    let rest: f64 = a[whole..n].iter().zip(&b[whole..n]).map(|(x, y)| x * y).sum();
+    sums.iter().sum::<f64>() + rest
 }

@@ -314,7 +314,7 @@ impl TruckModel {
             if n < 1.15 * e.idle_rad_s { demand.max(idle.clamp(0.0, 700.0)) } else { demand };
         let rise = p.torque_rise_nm_s.map_or(f64::INFINITY, |r| r * SUBSTEP_S);
         let fall = p.torque_fall_nm_s.map_or(f64::INFINITY, |r| r * SUBSTEP_S);
-        let lag = e.lag_s(s.engine_torque_nm, full_load_nm);
+        let lag = e.lag_s(s.engine_torque_nm, target, full_load_nm);
         let step = (target - s.engine_torque_nm) * (SUBSTEP_S / lag).min(1.0);
         s.engine_torque_nm = (s.engine_torque_nm + step.clamp(-fall, rise)).max(0.0);
         if s.shift.phase == ShiftPhase::Open {
@@ -484,14 +484,11 @@ impl TruckModel {
         }
     }
 
-    /// Induced drag: the steer axle's side force turned by the steering and slip angles. The
-    /// quasi-static side force of each body, `m a_y`, loses `a_y^2 m^2 / C` against the motion.
+    /// Induced drag of the quasi-static side forces.
     fn curve_drag_n(&self, s: &TruckState) -> f64 {
-        let m = self.lateral.yaw_sideslip();
+        let stiffness: f64 = self.lateral.yaw_sideslip().stiffness_n_rad.iter().sum();
         let accel = s.speed_m_s * s.lateral.yaw_rate_rad_s;
-        let stiffness: f64 = m.stiffness_n_rad.iter().sum();
-        let side_n = self.mass_kg * accel;
-        side_n * side_n / stiffness.max(1.0)
+        self.parameters.resistance.curve_n(self.mass_kg, accel, stiffness)
     }
 
     fn slow_states(&self, s: &mut TruckState, patch: &RoadPatch) {

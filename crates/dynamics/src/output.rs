@@ -123,7 +123,9 @@ impl TruckModel {
         }
     }
 
-    fn mean_pressure_pa(&self, s: &TruckState) -> f64 {
+    /// Brake pressure, Pa: mean over the axle groups, weighted with their share of the brake force.
+    #[must_use]
+    pub fn mean_pressure_pa(&self, s: &TruckState) -> f64 {
         self.brake_share.iter().zip(s.brake.pressure_pa).map(|(w, p)| w * p).sum()
     }
 

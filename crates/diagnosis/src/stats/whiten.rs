@@ -71,17 +71,19 @@ impl Whitener {
 
     /// Whitened record, zero where masked.
     pub(crate) fn apply(&self, x: &[f64], ok: &[bool]) -> Vec<f64> {
+        let n = x.len().min(ok.len());
+        let mut out = x[..n].to_vec();
+        for (lag, a) in self.coefficients.iter().enumerate() {
+            let from = (lag + 1).min(n);
+            for (y, x) in out[from..].iter_mut().zip(x) {
+                *y -= a * x;
+            }
+        }
         let scale = 1.0 / self.sigma;
-        let a = &self.coefficients;
-        (0..x.len().min(ok.len()))
-            .map(|i| {
-                if !ok[i] {
-                    return 0.0;
-                }
-                let past: f64 = a.iter().zip(x[..i].iter().rev()).map(|(a, x)| a * x).sum();
-                (x[i] - past) * scale
-            })
-            .collect()
+        for (y, ok) in out.iter_mut().zip(ok) {
+            *y = if *ok { *y * scale } else { 0.0 };
+        }
+        out
     }
 }
 

@@ -9,7 +9,8 @@
 //!
 //! The demand of a pedal is `pedal (T_full + T_f)` (an all-torque pedal), or a map over pedal and
 //! speed where the truck file gives one. The cylinder charge follows with two first-order lags:
-//! a fast one below `lag_threshold_frac` of full load, a slow one (turbocharger) above it.
+//! a slow one (turbocharger) while it rises above `lag_threshold_frac` of full load, a fast one
+//! otherwise: charge that is there can be left unused at once.
 //! J1939 SPN 513 is T_ind over the reference torque.
 //!
 //! Left out: cylinder cut-off, exhaust after-treatment, cold-start enrichment.
@@ -44,9 +45,9 @@ pub struct EngineParameters {
     pub max_speed_rpm: f64,
     /// Inertia of crank, flywheel and clutch, kg m².
     pub inertia_kg_m2: f64,
-    /// Lag of torque below the threshold, s.
+    /// Lag of torque that falls or stays below the threshold, s.
     pub fast_lag_s: f64,
-    /// Lag of torque above the threshold, s (turbocharger).
+    /// Lag of torque that rises above the threshold, s (turbocharger).
     pub slow_lag_s: f64,
     /// Share of full load at which the lag changes.
     pub lag_threshold_frac: f64,
@@ -250,12 +251,13 @@ impl Engine {
         }
     }
 
-    /// Lag of the torque at a level, s.
+    /// Lag of the torque on its way from a level to a target, s.
     #[must_use]
-    pub fn lag_s(&self, indicated_nm: f64, full_load_nm: f64) -> f64 {
+    pub fn lag_s(&self, indicated_nm: f64, target_nm: f64, full_load_nm: f64) -> f64 {
         let p = &self.parameters;
-        let low = indicated_nm <= p.lag_threshold_frac * full_load_nm;
-        if low { p.fast_lag_s } else { p.slow_lag_s }
+        let boosting =
+            target_nm > indicated_nm && indicated_nm > p.lag_threshold_frac * full_load_nm;
+        if boosting { p.slow_lag_s } else { p.fast_lag_s }
     }
 
     /// Torque that the auxiliaries take from the crank, Nm.

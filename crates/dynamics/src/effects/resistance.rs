@@ -5,7 +5,7 @@
 //! F_air   = 1/2 rho CdA (1 + k_y |beta|) V^2 cos(beta)  V, beta: air flow relative to the truck
 //! F_side  = 1/2 rho A_side c_side beta V^2              crosswind, a share of it on the tractor
 //! F_grade = m g sin(grade)
-//! F_curve = sum F_y alpha                               induced drag of the side forces
+//! F_curve = k_c (m a_y)^2 / C                            induced drag of the side forces, C: sum
 //! ```
 //! Sources: VECTO air drag model (yaw dependence), ISO 28580 (rolling), Hyttinen 2022 (warm-up).
 
@@ -34,6 +34,9 @@ pub struct ResistanceParameters {
     /// Constant extra force (a dragging brake), N.
     #[serde(default)]
     pub parasitic_force_n: f64,
+    /// Factor on the induced drag of the side forces in curves, 1 = as the tyres' slip angles give.
+    #[serde(default = "one")]
+    pub curve_drag_coeff: f64,
     /// Drag area CdA, m².
     pub drag_area_m2: f64,
     /// Growth of CdA per radian of air yaw, 1/rad.
@@ -56,6 +59,9 @@ pub struct ResistanceParameters {
     pub wind_to_y_m_s: f64,
 }
 
+fn one() -> f64 {
+    1.0
+}
 fn warmup_s() -> f64 {
     1_500.0
 }
@@ -118,6 +124,7 @@ impl ResistanceParameters {
         b.within("cold_tyre_extra_frac", self.cold_tyre_extra_frac, 0.0, 2.0);
         b.within("tyre_warmup_s", self.tyre_warmup_s, 10.0, 20_000.0);
         b.within("parasitic_force_n", self.parasitic_force_n, 0.0, 50_000.0);
+        b.within("curve_drag_coeff", self.curve_drag_coeff, 0.0, 10.0);
         b.within("drag_area_m2", self.drag_area_m2, 0.0, 20.0);
         b.within("drag_yaw_1_rad", self.drag_yaw_1_rad, 0.0, 10.0);
         b.within("side_force_area_m2_rad", self.side_force_area_m2_rad, 0.0, 500.0);
@@ -136,6 +143,14 @@ impl ResistanceParameters {
         let coeff = self.rolling_coeff + self.rolling_per_speed_s_m * speed_m_s.abs();
         let cold = 1.0 + self.cold_tyre_extra_frac * (1.0 - warmth);
         mass_kg * GRAVITY_M_S2 * cos_grade * coeff * cold + self.parasitic_force_n
+    }
+
+    /// Induced drag, N, of the side force `m a_y` (lateral acceleration, m/s²) on tyres whose
+    /// cornering stiffnesses add up to `stiffness_n_rad`.
+    #[must_use]
+    pub fn curve_n(&self, mass_kg: f64, lateral_m_s2: f64, stiffness_n_rad: f64) -> f64 {
+        let side_n = mass_kg * lateral_m_s2;
+        self.curve_drag_coeff * side_n * side_n / stiffness_n_rad.max(1.0)
     }
 
     /// Air drag, N; positive against forward motion.
