@@ -385,6 +385,7 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
 
 fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<(Cause, bool)> {
     let zero = &problem.reference.theta;
+    let variances = problem.variances(fit);
     let mut out = Vec::new();
     for (i, h) in fit.set.iter().enumerate() {
         let hyp = &CATALOGUE[*h];
@@ -420,7 +421,7 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
                 let x = fit.theta[*p as usize] - zero[*p as usize];
                 let scale = s.key.ends_with("_scale") || s.key == "scale";
                 let form = if hyp.sizes.contains(p) { 0.015 * x.abs() } else { 0.0 };
-                let sigma = (fit.covariance[(j, j)] + form * form).sqrt();
+                let sigma = (variances[j] + form * form).sqrt();
                 let value = if scale { 1.0 + x } else { x };
                 parameters.insert(s.key, Parameter { value, sigma, unit: s.unit });
             }

@@ -25,7 +25,7 @@ pub(crate) struct Hypothesis {
     pub(crate) sizes: &'static [P],
     pub(crate) shapes: &'static [P],
     /// Values of the shape parameters (offsets from nominal) to start from.
-    pub(crate) starts: &'static [f64],
+    pub(crate) starts: &'static [Start],
     pub(crate) channels: &'static [C],
     /// Smallest size worth a word, in the unit of the first parameter.
     pub(crate) min_size: f64,
@@ -34,14 +34,17 @@ pub(crate) struct Hypothesis {
 }
 
 const LONG: &[C] = &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac];
-const ONE: &[f64] = &[0.0];
+/// Where the fit of the shape parameters begins, in their order.
+pub(crate) type Start = [f64; 2];
+
+const ONE: &[Start] = &[[0.0; 2]];
 
 const fn h(
     id: &'static str,
     kind: CauseKind,
     sizes: &'static [P],
     shapes: &'static [P],
-    starts: &'static [f64],
+    starts: &'static [Start],
     channels: &'static [C],
     min_size: f64,
     sign: f64,
@@ -69,14 +72,32 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h("mass", V, &[P::Mass], &[], ONE, LONG, 0.02, 0.0),
     h("grade_bias", I, &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0),
     h("map_shift", I, &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0),
-    h("tyre_warmup", M, &[P::WarmupAmp], &[P::WarmupTau], &[-0.7, 0.0, 0.7], LONG, 0.1, 1.0),
+    h(
+        "tyre_warmup",
+        M,
+        &[P::WarmupAmp],
+        &[P::WarmupTau],
+        &[[-0.7, 0.0], [0.0, 0.0], [0.7, 0.0]],
+        LONG,
+        0.1,
+        1.0,
+    ),
     h("driveline_loss", V, &[P::DrivelineLoss], &[], ONE, LONG, 0.01, 0.0),
     h(
         "fan_load",
         M,
         &[P::FanPower],
-        &[P::FanStart],
-        &[-10.0, -6.0, -3.0, 0.0, 3.0, 6.0],
+        &[P::FanStart, P::FanWidth],
+        &[
+            [-10.0, 0.0],
+            [-5.0, 0.0],
+            [-2.0, 0.0],
+            [1.0, 0.0],
+            [4.0, 0.0],
+            [-5.0, 4.0],
+            [-2.0, 4.0],
+            [1.0, 4.0],
+        ],
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::CoolantTempDegc],
         6.0,
         1.0,
@@ -88,7 +109,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         M,
         &[P::Altitude],
         &[P::AltitudeStart],
-        &[-1200.0, -700.0, -200.0, 300.0, 700.0],
+        &[[-1200.0, 0.0], [-700.0, 0.0], [-200.0, 0.0], [300.0, 0.0], [700.0, 0.0]],
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::GpsAltitudeM],
         0.015,
         1.0,
@@ -98,7 +119,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         M,
         &[P::HeatAir],
         &[P::HeatAirStart],
-        &[-12.0, -6.0, 0.0, 4.0],
+        &[[-12.0, 0.0], [-6.0, 0.0], [0.0, 0.0], [4.0, 0.0]],
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::AmbientTempDegc],
         0.01,
         1.0,
@@ -108,7 +129,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         M,
         &[P::HeatCoolant],
         &[P::HeatCoolantStart],
-        &[-8.0, -4.0, 0.0, 5.0, 9.0],
+        &[[-8.0, 0.0], [-4.0, 0.0], [0.0, 0.0], [5.0, 0.0], [9.0, 0.0]],
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::CoolantTempDegc],
         0.01,
         1.0,
@@ -139,7 +160,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         V,
         &[P::FuelLow],
         &[P::FuelLowLoad],
-        &[-0.5, 0.0, 0.6],
+        &[[-0.5, 0.0], [0.0, 0.0], [0.6, 0.0]],
         &[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm],
         0.04,
         0.0,
@@ -159,7 +180,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         M,
         &[P::Fade],
         &[P::FadeStart],
-        &[-80.0, -40.0, 0.0, 60.0],
+        &[[-80.0, 0.0], [-40.0, 0.0], [0.0, 0.0], [60.0, 0.0]],
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::BrakePressureKpa],
         0.05,
         1.0,
@@ -295,8 +316,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "payload_position",
         V,
         &[P::PayloadX],
-        &[],
-        ONE,
+        &[P::StiffnessFollows],
+        &[[0.0, 0.0], [1.0, 0.0]],
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.15,
         0.0,

@@ -35,6 +35,11 @@ pub(crate) type Column = [Vec<f64>; MODULES];
 /// touch: modules do not see each other's parameters.
 type Replayed = std::sync::Mutex<HashMap<Vec<u64>, Arc<Column>>>;
 
+/// Drives' worth of the expected scatter that the baseline has to outweigh, and rounds of the
+/// iteration.
+const SCATTER_PRIOR: f64 = 2.0;
+const SCATTER_ROUNDS: usize = 25;
+
 /// Most sensitivities kept per drive.
 const KEPT: usize = 160;
 
@@ -102,7 +107,7 @@ impl Reference {
     fn start(drives: &[Prepared], residuals: &[Residuals], theta: Theta) -> Self {
         let mut tolerance = [0.0; PARAMS];
         for (t, s) in tolerance.iter_mut().zip(&SPECS) {
-            *t = s.tolerance;
+            *t = s.scatter();
         }
         let whiteners = fit_whiteners(drives, residuals, true);
         Self { theta, tolerance, whiteners, ratio: [1.0; MODULES], free_form: [0.0; MODULES] }
@@ -168,33 +173,16 @@ impl<'a> Problem<'a> {
             if clean || round > 0 {
                 problem.calibrate(clean)?;
             }
+            if clean && round > 0 {
+                problem.scatter();
+                problem.refresh()?;
+            }
             let mut noise = Vec::with_capacity(problem.drives.len());
-            let mut second: Vec<f64> = vec![0.0; PARAMS];
             for i in 0..problem.drives.len() {
-                let (z, variance) = problem.nuisance_posterior(i)?;
-                for (s, (z, v)) in nuisance_directions(&problem.reference.tolerance)
-                    .iter()
-                    .zip(z.iter().zip(&variance))
-                {
-                    let sigma = problem.reference.tolerance[s.p as usize];
-                    second[s.p as usize] += sigma * sigma * (z * z + v);
-                }
+                let z = problem.nuisance_mean(i);
                 noise.push(problem.without_nuisance(i, &z));
             }
             problem.reference.whiteners = fit_whiteners(&problem.drives, &noise, false);
-            if clean && round > 0 {
-                let count = problem.drives.len() as f64;
-                for s in SPECS.iter().filter(|s| s.tolerance > 0.0) {
-                    let prior = 2.0;
-                    let v = (prior * s.tolerance * s.tolerance + second[s.p as usize])
-                        / (prior + count);
-                    let bound = match s.p {
-                        P::TurboLag | P::PedalDelay | P::TorqueReport => 1.5,
-                        _ => 10.0,
-                    };
-                    problem.reference.tolerance[s.p as usize] = v.sqrt().min(bound * s.tolerance);
-                }
-            }
             problem.refresh()?;
         }
         if clean {
@@ -416,15 +404,59 @@ impl<'a> Problem<'a> {
         self.at(i, theta).1
     }
 
-    /// Posterior of a drive's tolerances at the reference: mean and variance, in their sigmas.
-    fn nuisance_posterior(&self, i: usize) -> Result<(Vec<f64>, Vec<f64>), DiagnosisError> {
+    /// Posterior mean of a drive's tolerances at the reference, in their sigmas.
+    fn nuisance_mean(&self, i: usize) -> Vec<f64> {
         let r = self.whitened(i, &self.reference.theta);
         let n = &self.nuisance[i];
         let zr = DVector::from_iterator(n.columns.len(), n.columns.iter().map(|c| dot(c, &r)));
-        let z = n.factor.solve(&zr);
-        let inverse = n.factor.inverse();
-        let variance = inverse.diagonal().iter().copied().collect();
-        Ok((z.iter().copied().collect(), variance))
+        n.factor.solve(&zr).iter().copied().collect()
+    }
+
+    /// Scatter of every tolerance between the drives by expectation-maximisation: the mean square
+    /// of what each drive says of it, with [`SCATTER_PRIOR`] drives' worth of what is expected.
+    fn scatter(&mut self) {
+        let specs: Vec<&crate::param::Spec> =
+            nuisance_directions(&self.reference.tolerance).iter().map(|d| d.p.spec()).collect();
+        let systems: Vec<(DMatrix<f64>, DVector<f64>)> = (0..self.drives.len())
+            .map(|i| {
+                let r = self.whitened(i, &self.reference.theta);
+                let c = &self.nuisance[i].columns;
+                let a = DMatrix::from_fn(c.len(), c.len(), |x, y| {
+                    if x <= y { dot(&c[x], &c[y]) } else { 0.0 }
+                });
+                let a = DMatrix::from_fn(c.len(), c.len(), |x, y| a[(x.min(y), x.max(y))]);
+                (a, DVector::from_iterator(c.len(), c.iter().map(|c| dot(c, &r))))
+            })
+            .collect();
+        let count = self.drives.len() as f64;
+        // Variances in units of those that the columns are scaled with.
+        let mut variance = vec![1.0; specs.len()];
+        for _ in 0..SCATTER_ROUNDS {
+            let mut second = vec![0.0; specs.len()];
+            for (a, b) in &systems {
+                let mut a = a.clone();
+                for (j, v) in variance.iter().enumerate() {
+                    a[(j, j)] += 1.0 / v;
+                }
+                let Some(factor) = a.cholesky() else { return };
+                let (z, spread) = (factor.solve(b), factor.inverse());
+                for (j, s) in second.iter_mut().enumerate() {
+                    *s += z[j] * z[j] + spread[(j, j)];
+                }
+            }
+            for ((v, second), s) in variance.iter_mut().zip(second).zip(&specs) {
+                let expected = (s.scatter() / self.reference.tolerance[s.p as usize]).powi(2);
+                let bound = match s.p {
+                    P::TurboLag | P::PedalDelay | P::TorqueReport => 2.0,
+                    _ => 10.0,
+                };
+                *v = ((SCATTER_PRIOR * expected + second) / (SCATTER_PRIOR + count))
+                    .min(bound * bound * expected);
+            }
+        }
+        for (v, s) in variance.iter().zip(&specs) {
+            self.reference.tolerance[s.p as usize] *= v.sqrt();
+        }
     }
 
     /// Raw residuals of a drive after its tolerances are taken out.
@@ -432,7 +464,9 @@ impl<'a> Problem<'a> {
         let d = &self.drives[i];
         let mut t = self.reference.theta;
         for (s, z) in nuisance_directions(&self.reference.tolerance).iter().zip(z) {
-            t[s.p as usize] += z * self.reference.tolerance[s.p as usize];
+            let x = &mut t[s.p as usize];
+            *x = (*x + z * self.reference.tolerance[s.p as usize])
+                .clamp(s.p.spec().lo, s.p.spec().hi);
         }
         replay(d, self.plant, &t)
     }

@@ -8,7 +8,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::hypothesis::{CATALOGUE, Hypothesis};
+use crate::hypothesis::{CATALOGUE, Hypothesis, Start};
 use crate::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, Problem};
 use crate::stats::evidence;
@@ -17,6 +17,10 @@ use crate::stats::evidence;
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
 /// Part of the evidence already found in the same modules that another cause must add.
 pub(crate) const RELATIVE_EVIDENCE: f64 = 0.01;
+/// Sigmas by which a size must differ from nothing, once the drives' disagreement counts.
+const MIN_SIGMAS: f64 = 2.6;
+/// How many drives' worth the expectation counts that drives scatter as their information says.
+const DISPERSION_PRIOR: f64 = 4.0;
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
 
@@ -40,7 +44,7 @@ pub(crate) struct Fit {
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) hypothesis: usize,
-    pub(crate) start: f64,
+    pub(crate) start: Start,
     /// Gain over the present set, nats, linear.
     pub(crate) gain: f64,
 }
@@ -120,15 +124,52 @@ impl Problem<'_> {
         Some(Fit { set: set.to_vec(), theta, log_z, free, covariance, gram, norm })
     }
 
+    /// Variances of the free parameters, widened by what the drives disagree about.
+    ///
+    /// The drives' score contributions `s_i` scatter as the information says if the model's form
+    /// and tolerances are right; the ratio of both is the over-dispersion (the sandwich estimate
+    /// with drives as clusters: Liang and Zeger, Biometrika 73, 1986). Six drives know that ratio
+    /// poorly, so it is drawn towards one by [`DISPERSION_PRIOR`] drives' worth, and the interval
+    /// gets the t-factor of what is left.
+    pub(crate) fn variances(&self, fit: &Fit) -> Vec<f64> {
+        let zero = &self.reference.theta;
+        let sigma = prior(&fit.free);
+        let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
+        let pull = DVector::from_fn(k, |j, _| {
+            let p = fit.free[j] as usize;
+            (fit.theta[p] - zero[p]) / (sigma[j] * sigma[j] * drives)
+        });
+        let (mut seen, mut expected) = (vec![0.0; k], vec![0.0; k]);
+        for g in &fit.gram.per_drive {
+            let a = g.view((1, 1), (k, k));
+            let score = g.view((1, 0), (k, 1)).column(0) - &pull;
+            let moved = &fit.covariance * score;
+            let spread = &fit.covariance * a * &fit.covariance;
+            for j in 0..k {
+                seen[j] += moved[j] * moved[j];
+                expected[j] += spread[(j, j)];
+            }
+        }
+        let freedom = drives - 1.0 + DISPERSION_PRIOR;
+        let t_factor = 1.0 + 1.2 / freedom;
+        (0..k)
+            .map(|j| {
+                let ratio = seen[j] / expected[j].max(f64::MIN_POSITIVE) * drives;
+                let dispersion = (DISPERSION_PRIOR + ratio) / freedom;
+                fit.covariance[(j, j)] * dispersion.max(0.8) * t_factor * t_factor
+            })
+            .collect()
+    }
+
     /// Gains of all hypotheses in `open` at the fit, best first.
     pub(crate) fn screen(&self, fit: &Fit, open: &[usize]) -> Vec<Candidate> {
         let mut dirs = directions(&fit.free, &fit.theta);
         let k = dirs.len();
-        let mut columns: Vec<(usize, f64, Vec<usize>)> = Vec::new();
+        let mut columns: Vec<(usize, Start, Vec<usize>)> = Vec::new();
         for h in open {
             let hyp = &CATALOGUE[*h];
             for start in hyp.starts {
-                let shape: Vec<(P, f64)> = hyp.shapes.iter().map(|p| (*p, *start)).collect();
+                let shape: Vec<(P, f64)> = hyp.shapes.iter().copied().zip(*start).collect();
                 let mut at = Vec::new();
                 for p in hyp.sizes {
                     at.push(dirs.len());
@@ -264,8 +305,8 @@ impl Problem<'_> {
         let mut set = best.set.clone();
         set.push(c.hypothesis);
         let mut theta = best.theta;
-        for p in hyp.shapes {
-            theta[*p as usize] = c.start;
+        for (p, start) in hyp.shapes.iter().zip(c.start) {
+            theta[*p as usize] = start;
         }
         for p in hyp.sizes {
             theta[*p as usize] = self.reference.theta[*p as usize]
@@ -339,7 +380,7 @@ impl Problem<'_> {
         let mut owner = Vec::new();
         for (i, h) in CATALOGUE.iter().enumerate() {
             for start in h.starts {
-                let shape = h.shapes.iter().map(|p| (*p, *start)).collect();
+                let shape = h.shapes.iter().copied().zip(*start).collect();
                 let p = h.sizes[0];
                 dirs.push(Direction { p, shape, step: p.spec().step });
                 owner.push(i);
@@ -354,14 +395,15 @@ impl Problem<'_> {
         out
     }
 
-    /// Takes out causes that are too small for a word or that do not pay on drives they were not
+    /// Takes out causes that are too small for a word, within the drives' disagreement, or that do not pay on drives they were not
     /// fitted to (two folds of whole drives, linear refit around the joint fit).
     pub(crate) fn gate(&self, fit: Fit, empty: &Fit, _open: &[usize]) -> Fit {
         let mut fit = fit;
         let mut i = 0;
         while i < fit.set.len() {
             let hyp = &CATALOGUE[fit.set[i]];
-            let small = hyp.size(&fit.theta, &self.reference.theta).abs() < 0.25 * hyp.min_size;
+            let size = hyp.size(&fit.theta, &self.reference.theta).abs();
+            let small = size < 0.25 * hyp.min_size || !self.stands_out(&fit, i);
             if small || self.folds(&fit, i) < 3.0 {
                 let (set, theta) = self.without(&fit, i);
                 match self.fit(&set, &theta, empty.norm) {
@@ -374,6 +416,16 @@ impl Problem<'_> {
             }
         }
         fit
+    }
+
+    /// A size of the `i`-th member is beyond what the drives disagree about.
+    fn stands_out(&self, fit: &Fit, member: usize) -> bool {
+        let variances = self.variances(fit);
+        let sizes = CATALOGUE[fit.set[member]].sizes;
+        fit.free.iter().zip(&variances).any(|(p, v)| {
+            let x = fit.theta[*p as usize] - self.reference.theta[*p as usize];
+            sizes.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
+        })
     }
 
     /// Gain of the `i`-th member on unseen halves of the drives, nats.

@@ -53,12 +53,12 @@ pub(crate) fn acceleration(
     speed: Option<&[f64]>,
 ) -> Vec<f64> {
     let model = Longitudinal::new(d, plant, t);
-    let mut brake_k = 0.0;
+    let mut slow = Slow::default();
     let scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     (0..d.n)
         .map(|i| {
             let v = speed.map_or(d.speed[i] * scale, |s| s[i]);
-            model.acceleration(i, v, &mut brake_k)
+            model.acceleration(i, v, &mut slow)
         })
         .collect()
 }
@@ -77,6 +77,16 @@ pub(crate) struct Longitudinal<'a> {
     cold: f64,
     warm_tau: f64,
     hot_brakes: bool,
+    pressure_lag: f64,
+}
+
+/// What the balance remembers from sample to sample.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Slow {
+    /// Heating of the brakes above the air, K.
+    brake_k: f64,
+    /// How far the fan is on, 0 to 1.
+    fan: f64,
 }
 
 impl<'a> Longitudinal<'a> {
@@ -100,16 +110,16 @@ impl<'a> Longitudinal<'a> {
             cold: if d.warm { 0.0 } else { t[P::WarmupAmp as usize] },
             warm_tau: 1800.0 * t[P::WarmupTau as usize].exp(),
             hot_brakes: t[P::Fade as usize] != 0.0,
+            pressure_lag: t[P::PressureLag as usize] / Drive::STEP_S,
             d,
             plant,
             t,
         }
     }
 
-    /// Acceleration at sample `i` at speed `v`, m/s; `brake_k` is the brakes' heating above the
-    /// air, K, carried from sample to sample.
+    /// Acceleration at sample `i` at speed `v`, m/s; `slow` is carried from sample to sample.
     #[inline]
-    pub(crate) fn acceleration(&self, i: usize, v: f64, brake_k: &mut f64) -> f64 {
+    pub(crate) fn acceleration(&self, i: usize, v: f64, slow: &mut Slow) -> f64 {
         let (d, p, t) = (self.d, self.plant, self.t);
         let gear = if d.gear[i] < self.per_gear.len() { d.gear[i] } else { 0 };
         let (per_m, inertia) = self.per_gear[gear];
@@ -120,8 +130,12 @@ impl<'a> Longitudinal<'a> {
         let friction = (p.friction_nm[0] + p.friction_nm[1] * n) * (1.0 + t[P::Friction as usize]);
         let mut auxiliary_w = p.auxiliary_power_w;
         if t[P::FanPower as usize] != 0.0 {
+            // Play between the two thresholds: on above the start, off below it by the width.
             let start = 97.0 + t[P::FanStart as usize];
-            auxiliary_w += 1e3 * t[P::FanPower as usize] * step(d.coolant[i] - start, 0.7);
+            let over = d.coolant[i] - start;
+            let (low, high) = (step(over, 0.7), step(over + t[P::FanWidth as usize], 0.7));
+            slow.fan = slow.fan.clamp(low, high);
+            auxiliary_w += 1e3 * t[P::FanPower as usize] * slow.fan;
         }
         let brake = d.engine_brake[i]
             * (p.engine_brake_nm[0] + p.engine_brake_nm[1] * n)
@@ -136,7 +150,7 @@ impl<'a> Longitudinal<'a> {
             rolling *= 1.0 + self.cold * (-(i as f64) * Drive::STEP_S / self.warm_tau).exp();
         }
         let resistance = self.mass * GRAVITY_M_S2 * slope * (rolling + grade);
-        let service = self.service_brake(i, v, brake_k);
+        let service = self.service_brake(i, v, &mut slow.brake_k);
         let per_prop = p.final_drive_ratio / p.wheel_radius_m;
         let coasting = d.pedal[i] < 0.01 && v > 8.0;
         let retarder = (t[P::RetarderStage as usize] * d.engine_brake[i]
@@ -174,7 +188,7 @@ impl<'a> Longitudinal<'a> {
     #[inline]
     fn service_brake(&self, i: usize, v: f64, brake_k: &mut f64) -> f64 {
         let p = self.plant;
-        let pressure = self.d.pressure[i];
+        let pressure = at_index(&self.d.fine_pressure, i as f64 + self.pressure_lag);
         let mut force = p.brake_gain_n_kpa * pressure * (1.0 + self.t[P::BrakeGain as usize]);
         if self.hot_brakes {
             let start = 150.0 + self.t[P::FadeStart as usize];

@@ -22,10 +22,12 @@ pub(crate) fn loaded(d: &Prepared, plant: &Plant, t: &Theta) -> LateralParameter
     p
 }
 
-/// Axle stiffness at the loads of the load sheet, N/rad.
-fn by_load_sheet(d: &Prepared, plant: &Plant, t: &Theta) -> [f64; dynamics::lateral::AXLES] {
+/// Axle stiffness, N/rad, at the loads of the load sheet; with `StiffnessFollows` = 1 at the loads
+/// of a payload that lies elsewhere.
+fn stiffness(d: &Prepared, plant: &Plant, t: &Theta) -> [f64; dynamics::lateral::AXLES] {
     let mut sheet = *t;
     sheet[P::Mass as usize] = 0.0;
+    sheet[P::PayloadX as usize] *= t[P::StiffnessFollows as usize];
     let p = loaded(d, plant, &sheet);
     p.tyres.stiffness_n_rad(&p.static_axle_load_n())
 }
@@ -80,7 +82,7 @@ impl BySpeed {
 pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3] {
     let p = loaded(d, plant, t);
     let mut model = YawSideslip::new(&p);
-    model.stiffness_n_rad = by_load_sheet(d, plant, t);
+    model.stiffness_n_rad = stiffness(d, plant, t);
     let scale = [t[P::CFront as usize], t[P::CDrive as usize], t[P::CTrailer as usize]];
     for (axle, c) in model.stiffness_n_rad.iter_mut().enumerate() {
         *c *= 1.0 + scale[[0, 1, 1, 2, 2, 2][axle]];
@@ -158,7 +160,7 @@ fn road_wheel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let keep = if lag > 1e-3 { (-Drive::STEP_S / lag).exp() } else { 0.0 };
     let ratio = steering.ratio * (1.0 + t[P::SteerRatio as usize]);
     let offset = steering.offset_rad + t[P::SteerOffset as usize];
-    let play = 0.5 * (steering.free_play_rad + t[P::FreePlay as usize]);
+    let play = 0.5 * (steering.free_play_rad + t[P::FreePlay as usize]).max(0.0);
     let mut gear = d.steer[0];
     let mut angle = (gear - offset) / ratio;
     (0..d.n)

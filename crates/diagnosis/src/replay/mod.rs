@@ -169,7 +169,9 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::RetarderCoast
         | P::TorqueScale
         | P::EngineBrakeScale
-        | P::SpeedLag => &[G::Force],
+        | P::SpeedLag
+        | P::PressureLag
+        | P::FanWidth => &[G::Force],
         P::WindX | P::WindY => &[G::Force, G::Lateral],
         P::Mass => &[G::Force, G::Lateral],
         P::GradeBias | P::MapShift => &[G::Force, G::Altitude, G::Imu],
@@ -195,6 +197,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::CDrive
         | P::CTrailer
         | P::PayloadX
+        | P::StiffnessFollows
         | P::Bank
         | P::Crosswind
         | P::AccelYBias

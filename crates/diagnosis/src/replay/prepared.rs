@@ -23,6 +23,8 @@ pub(crate) struct Prepared {
     pub(crate) engine_brake: Vec<f64>,
     pub(crate) xbr: Vec<f64>,
     pub(crate) pressure: Vec<f64>,
+    /// Pressure that brakes, finer than its message resolves.
+    pub(crate) fine_pressure: Vec<f64>,
     pub(crate) steer: Vec<f64>,
     pub(crate) yaw: Vec<f64>,
     pub(crate) trailer_yaw: Vec<f64>,
@@ -137,6 +139,7 @@ impl Prepared {
             engine_brake: get(C::EngineBrakeFrac, 0.0),
             xbr: get(C::XbrDecelMS2, 0.0),
             pressure: get(C::BrakePressureKpa, 0.0),
+            fine_pressure: Vec::new(),
             steer: get(C::SteeringWheelRad, 0.0),
             yaw: get(C::YawRateRadS, 0.0),
             trailer_yaw: get(C::TrailerYawRateRadS, 0.0),
@@ -159,6 +162,7 @@ impl Prepared {
             has,
         };
         d.mask(plant);
+        d.fine_pressure = super::brake::resolved(&d, plant);
         d
     }
 

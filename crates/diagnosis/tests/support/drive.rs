@@ -104,7 +104,8 @@ pub(crate) fn drive(
     let mut truth: Vec<Vec<f64>> = (0..LOGGED).map(|_| Vec::with_capacity(samples)).collect();
     let (mut integral, mut course, mut offset, mut wheel, mut hand) =
         (0.0_f64, setting.yaw_rad, 0.0_f64, 0.0_f64, 0.0_f64);
-    let (mut held_pedal, mut swing_goal, mut swing) = (0.0, 0.0, 0.0);
+    let (mut held_pedal, mut foot, mut slowing) = (0.0, 0.0, 0.0);
+    let (mut swing_goal, mut swing) = (0.0, 0.0);
     let (mut last_vy, mut target) = (0.0, 10.0);
     let air_k = setting.air_degc + 273.15;
     for i in 0..samples * 5 {
@@ -119,14 +120,16 @@ pub(crate) fn drive(
         integral = (integral + 0.04 * error * STEP_S).clamp(-0.2, 1.0);
         let wish = 0.35 * error + integral;
         let pedal = wish.clamp(0.0, 1.0);
+        foot += (pedal - foot).clamp(-2.5 * STEP_S, 1.5 * STEP_S);
         if i % 5 == 0 {
-            held_pedal = pedal;
+            held_pedal = foot;
         }
         let stage =
             if wish < -0.15 && v > 6.0 { ((-wish - 0.15) * 1.2).clamp(0.0, 1.0) } else { 0.0 };
         let stage = (stage * 100.0).round() / 100.0;
         let xbr = if error < -0.8 { (0.35 * (-error - 0.8)).clamp(0.0, 2.0) } else { 0.0 };
-        let xbr = (xbr * 2048.0_f64).round() / 2048.0;
+        slowing += (xbr - slowing) * STEP_S / 0.3;
+        let xbr = if slowing < 0.02 { 0.0 } else { (slowing * 2048.0_f64).round() / 2048.0 };
         if rng.random::<f64>() < STEP_S / 25.0 {
             swing_goal = between(rng, -0.8, 0.8);
         }
