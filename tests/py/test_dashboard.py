@@ -232,6 +232,20 @@ def test_the_page_fits_a_small_screen(server: Path, page: Page, tmp_path: Path) 
         assert width <= 390
 
 
+def test_a_lane_change_is_wished_on_the_page(
+    server: Path, tmp_path: Path, page: Page
+) -> None:
+    options = ["highway-empty", "--decider", "external", "--pace", "5"]
+    with running(server, tmp_path, *options) as run:
+        page.goto(run.url)
+        page.click("#left")
+        for _ in range(WAIT_MS // 100):
+            if run.get("/api/v1/state")["run"]["lane_changes"] > 0:
+                return
+            page.wait_for_timeout(100)
+        pytest.fail("no lane change was driven")
+
+
 def test_other_web_sites_cannot_ask(server: Path, tmp_path: Path) -> None:
     with running(server, tmp_path) as run:
         for header, value in [

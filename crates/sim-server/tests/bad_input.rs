@@ -33,12 +33,12 @@ fn what_the_contract_names_and_this_version_lacks_says_so() {
         &["--vehicle", "socketcand:localhost:29536/can0"],
         &["--ros2"],
         &["--foxglove"],
-        &["--decider", "external"],
-        &["--decider", "dqn:policy.safetensors"],
     ] {
         let line = refused(&[&["run", "--headless"], option].concat());
         assert!(line.contains("not supported"), "{option:?}: {line}");
     }
+    assert!(refused(&["run", "--headless", "--decider", "dqn:none.safetensors"]).contains("none"));
+    assert!(refused(&["run", "--headless", "--decider", "dqn:"]).contains("dqn:FILE"));
     assert!(refused(&["run", "--headless", "--decider", "rules:near"]).contains("rules:near"));
     assert!(refused(&["run", "--headless", "--decider", "rules:-3"]).contains("-3"));
 }

@@ -57,6 +57,16 @@ fn the_summary_has_the_keys_of_the_contract() {
 }
 
 #[test]
+fn a_learned_decider_drives_from_its_files() {
+    let weights =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../planner/tests/fixtures/policy.safetensors");
+    let decider = format!("dqn:{}", weights.display());
+    let summary = summary_of(&["--headless", "--duration", "40", "--decider", &decider]);
+    assert_eq!(summary["collisions"], 0);
+    assert_eq!(summary["end_reason"], "time_over");
+}
+
+#[test]
 fn the_same_seed_gives_the_same_bits_with_and_without_recorder_dashboard_and_pace() {
     let options = ["--duration", "60", "--seed", "11"];
     let headless = summary_of(&[&["--headless"], &options[..]].concat());

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use planner::decider::DeciderKind;
 use serde::{Deserialize, Serialize};
 
 use crate::{SimError, TrafficSection};
@@ -44,6 +45,10 @@ pub struct Scenario {
     /// The planning stack.
     #[serde(default)]
     pub stack: planner::StackConfig,
+    /// Weights of the learned decider (`stack.decider = "dqn"`): `policy.safetensors`, with its
+    /// `policy.json` beside it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy_file: Option<String>,
     /// The other vehicles.
     #[serde(default)]
     pub traffic: TrafficSection,
@@ -210,6 +215,9 @@ impl Scenario {
                 *file = folder.join(&*file).display().to_string();
             }
         }
+        if let Some(file) = &mut self.policy_file {
+            *file = folder.join(&*file).display().to_string();
+        }
         self.traffic.resolve_paths(folder);
     }
 
@@ -236,6 +244,9 @@ impl Scenario {
             if !(value >= low && value <= high) {
                 wrong.push(format!("{key} = {value} is outside {low} to {high}"));
             }
+        }
+        if (self.stack.decider == DeciderKind::Dqn) != self.policy_file.is_some() {
+            wrong.push("policy_file and stack.decider = \"dqn\" need each other".to_owned());
         }
         wrong.extend(self.traffic.violations());
         wrong

@@ -110,7 +110,13 @@ impl World {
             ..scenario.stack.clone()
         };
         let metrics = Metrics::new(truck.limits(), &config.rss, Arc::clone(&road));
-        let stack = Stack::new(config, truck.limits())?;
+        let stack = match &scenario.policy_file {
+            Some(file) => {
+                let policy = Arc::new(read_policy(file.as_ref())?);
+                Stack::with_policy(config, truck.limits(), policy)?
+            }
+            None => Stack::new(config, truck.limits())?,
+        };
         Ok(Self {
             metrics,
             sensors: scenario.traffic.perception.enabled,
@@ -228,3 +234,15 @@ impl World {
 /// The run ends when the front bumper is this close to the end of the road, m: the planner still
 /// sees road ahead of it.
 const END_MARGIN_M: f64 = 5.0;
+
+/// Weights of the learned decider, with the `.json` beside them.
+fn read_policy(file: &Path) -> Result<planner::decider::Policy, SimError> {
+    let io = |path: &Path| {
+        let path = path.to_owned();
+        move |source| SimError::Io { path, source }
+    };
+    let sidecar = file.with_extension("json");
+    let weights = std::fs::read(file).map_err(io(file))?;
+    let text = std::fs::read_to_string(&sidecar).map_err(io(&sidecar))?;
+    Ok(planner::decider::Policy::from_files(&weights, &text)?)
+}

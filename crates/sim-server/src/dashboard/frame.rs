@@ -32,6 +32,8 @@ pub(super) struct Frame<'a> {
 pub(super) struct Run<'a> {
     pub(super) scenario: &'a str,
     pub(super) state: RunState,
+    /// Lane changes are wished from outside.
+    pub(super) external_decider: bool,
     pub(super) pace: Pace,
     /// Simulated seconds per second since the last frame but a few.
     pub(super) realtime_factor: f64,
@@ -46,7 +48,7 @@ pub(super) struct Run<'a> {
 
 impl<'a> Run<'a> {
     pub(super) fn new(
-        scenario: &'a str,
+        (scenario, external_decider): (&'a str, bool),
         state: RunState,
         pace: Pace,
         realtime_factor: f64,
@@ -55,6 +57,7 @@ impl<'a> Run<'a> {
         Self {
             scenario,
             state,
+            external_decider,
             pace,
             realtime_factor: round(realtime_factor, 100.0),
             distance_m: round(summary.distance_m, 10.0),

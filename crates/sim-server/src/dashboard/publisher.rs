@@ -3,9 +3,10 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use planner::decider::DeciderKind;
 use road::Road;
 use serde::Serialize;
-use sim::Summary;
+use sim::{Scenario, Summary};
 use tractrix_core::{Recorder, Tick};
 
 use super::Shared;
@@ -18,6 +19,7 @@ pub(crate) struct Publisher {
     shared: Arc<Shared>,
     provenance: Provenance,
     scenario: String,
+    external_decider: bool,
     road: Arc<Road>,
     snapshot: Option<Snapshot>,
     /// Wall and simulated seconds of an earlier frame, for the factor.
@@ -42,13 +44,14 @@ impl Publisher {
     pub(crate) fn new(
         shared: Arc<Shared>,
         provenance: Provenance,
-        scenario: String,
+        scenario: &Scenario,
         road: Arc<Road>,
     ) -> Self {
         Self {
             shared,
             provenance,
-            scenario,
+            scenario: scenario.name.clone(),
+            external_decider: scenario.stack.decider == DeciderKind::External,
             road,
             snapshot: None,
             mark: (0.0, 0.0),
@@ -74,7 +77,13 @@ impl Publisher {
             provenance: self.provenance,
             kind: "frame",
             time_s,
-            run: Run::new(&self.scenario, state, pace, self.realtime_factor, summary),
+            run: Run::new(
+                (&self.scenario, self.external_decider),
+                state,
+                pace,
+                self.realtime_factor,
+                summary,
+            ),
             ego: Ego::from(&tick.ego),
             road: Here::new(&self.road, &tick.ego, tick.plan.lane),
             plan: Planned::from(&tick.plan),

@@ -2,6 +2,7 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
+use planner::decider::LaneChoice;
 use serde::Deserialize;
 
 use super::Pace;
@@ -24,6 +25,11 @@ pub(crate) enum Control {
         /// The new pace.
         #[serde(deserialize_with = "pace")]
         pace: Pace,
+    },
+    /// Wishes a lane change (decider `external`); the safety gate decides.
+    LaneChange {
+        /// Which way.
+        to: LaneChoice,
     },
 }
 
@@ -52,7 +58,12 @@ mod tests {
             read(r#"{"action":"pace","pace":"max"}"#).unwrap(),
             Control::Pace { pace: Pace::Max }
         );
+        assert_eq!(
+            read(r#"{"action":"lane_change","to":"left"}"#).unwrap(),
+            Control::LaneChange { to: LaneChoice::Left }
+        );
         for bad in [
+            r#"{"action":"lane_change","to":"up"}"#,
             r#"{"action":"fly"}"#,
             r#"{"action":"step"}"#,
             r#"{"action":"step","ticks":-1}"#,

@@ -201,6 +201,7 @@ impl Drive {
                 self.pacer.restart(self.pacer.pace(), now);
             }
             Control::Pace { pace } => self.pacer.restart(pace, now),
+            Control::LaneChange { to } => self.job.world.stack_mut().request_lane_change(to),
         }
     }
 

@@ -63,7 +63,7 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
         .then(|| Shared::new(dashboard::road_json(world.road(), &combination), controls.clone()));
     let publisher = shared.as_ref().map(|shared| {
         let road = Arc::clone(world.road());
-        Publisher::new(Arc::clone(shared), provenance, scenario.name.clone(), road)
+        Publisher::new(Arc::clone(shared), provenance, scenario, road)
     });
     let stop = Arc::new(AtomicBool::new(false));
     let pace = args.pace.unwrap_or(if args.headless { Pace::Max } else { Pace::REALTIME });

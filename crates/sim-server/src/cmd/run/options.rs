@@ -42,7 +42,7 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
         scenario.stack.speed_planner = word("--speed-planner", planner, "cruise or predictive")?;
     }
     if let Some(decider) = &args.decider {
-        scenario.stack.decider = decider_kind(decider)?;
+        (scenario.stack.decider, scenario.policy_file) = decider_kind(decider)?;
     }
     Ok(scenario)
 }
@@ -135,13 +135,6 @@ fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
         }
         _ => return Err(Failure::Input(format!("--vehicle {}: expected direct", args.vehicle))),
     }
-    let asked_for = |option: &Option<String>, flag: &str, kinds: &[&str]| match option {
-        Some(value) if kinds.iter().any(|kind| value.split(':').next() == Some(kind)) => {
-            Err(Failure::unsupported(&format!("{flag} {value}")))
-        }
-        _ => Ok(()),
-    };
-    asked_for(&args.decider, "--decider", &["external", "dqn"])?;
     for (asked, flag) in [(args.ros2, "--ros2"), (args.foxglove, "--foxglove")] {
         if asked {
             return Err(Failure::unsupported(flag));
@@ -150,21 +143,26 @@ fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `keep`, `mobil`, or `rules:` with the paper's distance in metres.
-fn decider_kind(text: &str) -> Result<DeciderKind, Failure> {
+/// `keep`, `mobil`, `external`, `rules:` with the paper's distance in metres, or `dqn:` with a file
+/// of weights.
+fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), Failure> {
     let kind = match text.split_once(':') {
         None if text == "keep" => DeciderKind::KeepLane,
         None if text == "mobil" => DeciderKind::Mobil(MobilConfig::default()),
+        None if text == "external" => DeciderKind::External,
+        Some(("dqn", file)) if !file.is_empty() => {
+            return Ok((DeciderKind::Dqn, Some(file.to_owned())));
+        }
         Some(("rules", distance)) if distance.parse::<f64>().is_ok() => {
             DeciderKind::Rules { distance_m: distance.parse().unwrap_or(f64::NAN) }
         }
         _ => {
-            let known = "keep, rules:50, rules:100, rules:150 or mobil";
+            let known = "keep, rules:50, rules:100, rules:150, mobil, external or dqn:FILE";
             return Err(Failure::Input(format!("--decider {text}: expected {known}")));
         }
     };
     kind.check().map_err(|e| Failure::Input(format!("--decider {text}: {e}")))?;
-    Ok(kind)
+    Ok((kind, None))
 }
 
 /// A field-less value by its word in a scenario file.

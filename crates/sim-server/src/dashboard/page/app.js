@@ -46,6 +46,7 @@ function show(f) {
   $("state").dataset.state = run.state;
   text("state", run.state);
   enable(run.state !== "finished");
+  for (const id of ["left", "right"]) $(id).hidden = !run.external_decider;
   text("play", run.state === "paused" ? "Play" : "Pause");
   if (document.activeElement !== $("pace")) selectPace(run.pace);
   text("time", clock(f.time_s));
@@ -88,7 +89,7 @@ function braking(ego) {
 
 // -- controls ------------------------------------------------------------------------------------
 const send = (control) => fetch("/api/v1/control", { method: "POST", body: JSON.stringify(control) });
-const enable = (on) => { for (const id of ["play", "step", "pace"]) $(id).disabled = !on; };
+const enable = (on) => { for (const id of ["play", "step", "pace", "left", "right"]) $(id).disabled = !on; };
 
 function selectPace(pace) {
   const select = $("pace");
@@ -98,7 +99,10 @@ function selectPace(pace) {
 
 const toggle = () => send({ action: frame?.run.state === "paused" ? "play" : "pause" });
 const step = () => send({ action: "step", ticks: 10 });
+const change = (to) => send({ action: "lane_change", to });
 $("play").onclick = toggle;
+$("left").onclick = () => change("left");
+$("right").onclick = () => change("right");
 $("step").onclick = step;
 $("pace").onchange = (e) => { send({ action: "pace", pace: e.target.value }); e.target.blur(); };
 $("in").onclick = () => view.zoomBy(1.35);
@@ -107,6 +111,8 @@ addEventListener("keydown", (e) => {
   if (e.target instanceof HTMLSelectElement || e.target instanceof HTMLButtonElement || $("play").disabled) return;
   if (e.key === " ") { e.preventDefault(); toggle(); }
   if (e.key === ".") step();
+  if (e.key === "ArrowLeft" && frame?.run.external_decider) change("left");
+  if (e.key === "ArrowRight" && frame?.run.external_decider) change("right");
 });
 
 enable(false);
