@@ -1,27 +1,54 @@
-//! Table of the speed planner against dynamic programming and both cruise controls.
+//! Table of the speed planner against both cruise controls, and on request against a reference that
+//! may switch the injection on and off at every step.
 //!
-//! `cargo run --release -p planner --example pcc_table [-- ROAD]`
+//! `cargo run --release -p planner --example pcc_table [-- ROAD] [--map] [--pulses]`: `--map` takes
+//! the bench map's engine, `--pulses` adds the reference (seconds per row).
 #![allow(clippy::disallowed_macros, clippy::disallowed_methods, clippy::unwrap_used)]
 
 #[path = "../tests/support/pcc/corpus.rs"]
 mod corpus;
 #[path = "../tests/support/data_sheet.rs"]
 mod data_sheet;
+#[allow(dead_code)]
 #[path = "../tests/support/pcc/dp.rs"]
 mod dp;
 
-use planner::pcc::course::{SpeedBand, Tuning};
 use planner::pcc::solver::DefaultSolver;
-use planner::pcc::trip::{Trip, TripRequest};
-use std::time::Instant;
+use planner::pcc::trip::{Trip, TripRequest, plan_trip};
+use planner::pcc::{SpeedBand, Tuning};
+
+/// Difference to the fuel of a reference that pays nothing at fuel cut-off, %.
+fn against_pulses(request: &TripRequest<'_>) -> f64 {
+    let trip = Trip::new(request).unwrap();
+    let end_e = *trip.cruise.e_j_kg.last().unwrap();
+    let mut solver = DefaultSolver::default();
+    let (d, profile) =
+        trip.solve(trip.cruise.trip_time_s(), end_e, &mut |a, b, c, d| solver.solve(a, b, c, d));
+    let task = dp::Task {
+        limits: request.truck,
+        h_m: trip.course.h_m,
+        sin: &trip.course.sin,
+        cos: &trip.course.cos,
+        e_min: &trip.e_min,
+        e_max: &trip.e_max,
+        start_e: trip.cruise.e_j_kg[0],
+        end_e,
+        shift_g: trip.tuning.shift_fuel_g,
+        accel_g: trip.tuning.accel_penalty_g_s3_m2,
+        brake_m_s2: trip.course.brake_m_s2,
+        charge_cut: false,
+    };
+    let r = dp::reference(&task, d.trip_time_s(), profile.beta_g_s, dp::QUICK);
+    100.0 * (d.total_fuel_g() / r.fuel_at(d.trip_time_s()) - 1.0)
+}
 
 fn main() {
-    let mut solver = DefaultSolver::default();
-    let mut solve = |a: &_, b, c, d: Option<&[f64]>| solver.solve(a, b, c, d);
+    let has = |name: &str| std::env::args().any(|a| a == name);
     let only = std::env::args().nth(1).filter(|a| !a.starts_with("--"));
     println!(
-        "road mass band | T cc0 | fuel cc0 cc5 | plan fuel time shifts brk | dp fuel time shifts | gap % | sqp it ms | dp s"
+        "| road | mass, t | band, km/h | time, s | plan, g | shifts | saved against brake at set speed, % | against +5 km/h, % | above pulsing reference, % |"
     );
+    println!("|---|---|---|---|---|---|---|---|---|");
     for (name, profile) in corpus::roads() {
         if only.as_ref().is_some_and(|o| !name.contains(o.as_str())) {
             continue;
@@ -30,12 +57,8 @@ fn main() {
             for (lo, hi) in [(65.0, 79.0), (60.0, 85.0), (50.0, 90.0)] {
                 let mut limits = data_sheet::reference_limits();
                 limits.road_load.mass_kg = mass;
-                if std::env::args().any(|a| a == "--linear") {
-                    limits.powertrain.fuel = tractrix_core::FuelModel::Willans {
-                        constant_g_s: 0.0,
-                        per_rpm_g_s: 0.0,
-                        per_kw_g_s: 0.052,
-                    };
+                if has("--map") {
+                    limits.powertrain.fuel = corpus::bench_map();
                 }
                 let request = TripRequest {
                     profile: &profile,
@@ -45,53 +68,20 @@ fn main() {
                     eco_roll: false,
                     tuning: Tuning::default(),
                 };
-                let trip = Trip::new(&request).unwrap();
-                let time = trip.cruise.trip_time_s();
-                let t0 = Instant::now();
-                let end = *trip.cruise.e_j_kg.last().unwrap();
-                let reference = dp::reference(
-                    &trip,
-                    time,
-                    end,
-                    if std::env::args().any(|a| a == "--fine") { dp::FINE } else { dp::QUICK },
-                );
-                let dp_s = t0.elapsed().as_secs_f64();
-                let (goal, end) = reference.as_ref().map_or((time, end), |r| {
-                    (r.driven.trip_time_s(), *r.driven.e_j_kg.last().unwrap())
-                });
-                let cc = (trip.cruise.total_fuel_g(), trip.overspeed.total_fuel_g());
-                let over = &trip.overspeed;
-                let (vs5, _) =
-                    trip.solve(over.trip_time_s(), *over.e_j_kg.last().unwrap(), &mut solve);
-                let (vs0, _) = trip.solve(time, end, &mut solve);
-                let savings = format!(
-                    "saves {:.2}/{:.2}",
-                    100.0 * (1.0 - vs0.total_fuel_g() / cc.0),
-                    100.0 * (1.0 - vs5.total_fuel_g() / cc.1)
-                );
-                let t0 = Instant::now();
-                let (d, profile) = trip.solve(goal, end, &mut solve);
-                let ms = t0.elapsed().as_secs_f64() * 1e3;
-                let (rf, rt, rs) = reference.as_ref().map_or((0.0, 0.0, 0), |r| {
-                    (r.driven.total_fuel_g(), r.driven.trip_time_s(), r.driven.shifts())
-                });
+                let r = plan_trip(&request).unwrap();
+                let pulses = if has("--pulses") {
+                    format!("{:+.2}", against_pulses(&request))
+                } else {
+                    String::from("-")
+                };
                 println!(
-                    "{name:9} {:2.0} {lo}-{hi} | {time:7.2} | {:7.1} {:7.1} | {:7.1} {:7.2} {:2} {:5.2} | {rf:7.1} {rt:7.2} {rs:2} b{:.2}/{:.2} | {:+.3} dt {:+.4} % | {savings} | {:?} {} {} {ms:.1} viol {:.1e} | {dp_s:.2}",
+                    "| {name} | {:.0} | {lo:.0}-{hi:.0} | {:.1} | {:.0} | {} | {:.2} | {:.2} | {pulses} |",
                     mass / 1e3,
-                    trip.cruise.total_fuel_g(),
-                    trip.overspeed.total_fuel_g(),
-                    d.total_fuel_g(),
-                    d.trip_time_s(),
-                    d.shifts(),
-                    d.brake_energy_j(mass, trip.course.h_m) / 1e6,
-                    profile.beta_g_s,
-                    reference.as_ref().map_or(0.0, |r| r.beta_g_s),
-                    100.0 * (d.total_fuel_g() / rf - 1.0),
-                    100.0 * (d.trip_time_s() / goal - 1.0),
-                    profile.status,
-                    profile.subproblems,
-                    profile.iterations,
-                    trip.violation(&d),
+                    r.plan.trip_time_s,
+                    r.plan.fuel_g,
+                    r.plan.shifts,
+                    100.0 * r.saving_vs_set_speed_frac,
+                    100.0 * r.saving_vs_overspeed_frac,
                 );
             }
         }

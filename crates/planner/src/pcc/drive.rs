@@ -175,6 +175,31 @@ fn full_load_energy(
     low
 }
 
+/// The least energy, from `e0` up, from which full load reaches `e1` in interval `k`.
+pub(crate) fn needed_before(
+    truck: &Truck,
+    course: &Course,
+    k: usize,
+    drive: Drive,
+    e0: f64,
+    e1: f64,
+) -> f64 {
+    let excess = |e0: f64| {
+        let (demand, limit) = demand_and_limit(truck, course, k, drive, e0, e1);
+        demand - limit
+    };
+    let mut before = e0;
+    // The inertia dominates: each step takes away most of what is missing.
+    for _ in 0..8 {
+        let missing = excess(before);
+        if missing <= POWER_ROUNDING {
+            break;
+        }
+        before += missing * course.h_m / truck.inertia(drive);
+    }
+    before
+}
+
 /// Drives interval `k` toward `target_e`, with no more than full load and the planned brakes.
 pub fn drive_leg(
     truck: &Truck,

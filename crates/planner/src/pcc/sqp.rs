@@ -11,7 +11,7 @@
 use alloc::vec::Vec;
 
 use super::course::{Course, Tuning};
-use super::drive::drive_profile;
+use super::drive::{drive_leg, drive_profile, needed_before};
 use super::gears::{GearChoice, choose_gears};
 use super::lin::{Subproblem, Terminal, TimeRule};
 use super::search::{EngineTables, SearchGrid, SearchPrices, search};
@@ -121,6 +121,12 @@ pub type Solver<'s> = dyn FnMut(&Subproblem, Terminal, TimeRule, Option<&[f64]>)
 const SEARCH_INTERVAL_M: f64 = 100.0;
 /// Energy steps of the gear search that full traction covers in one interval.
 const SEARCH_STEPS: f64 = 14.0;
+/// Length of an interval of the search in a tube, m.
+const TUBE_INTERVAL_M: f64 = 25.0;
+/// Energy steps that full traction covers in one interval of the tube.
+const TUBE_STEPS: f64 = 12.0;
+/// Half width of the tube in energy steps.
+const TUBE_HALF_STEPS: f64 = 14.0;
 
 impl Problem<'_> {
     /// Gears and a first profile from the coarse joint search at the price `beta_g_s`; `otherwise`
@@ -133,32 +139,66 @@ impl Problem<'_> {
         fineness: f64,
         otherwise: (&[f64], &[Drive]),
     ) -> (Vec<f64>, Vec<Drive>) {
-        let (truck, course) = (self.truck, self.course);
-        let n = course.n();
-        let merge = (libm::round(SEARCH_INTERVAL_M / course.h_m) as usize).clamp(1, n);
+        let (n, h) = (self.course.n(), self.course.h_m);
+        let merge = (libm::round(SEARCH_INTERVAL_M / h) as usize).clamp(1, n);
+        let step = (self.reach_j_kg(merge) / (SEARCH_STEPS * fineness)).clamp(0.5, 4.0);
+        self.searched(tables, beta_g_s, (&self.e_min, &self.e_max), merge, step)
+            .unwrap_or_else(|| (otherwise.0.to_vec(), otherwise.1.to_vec()))
+    }
+
+    /// Gears and profile from the joint search on a finer grid in a tube around the energies `e`;
+    /// `None` where the tube holds no path.
+    #[must_use]
+    pub fn tube_profile(
+        &self,
+        tables: &EngineTables,
+        beta_g_s: f64,
+        e: &[f64],
+    ) -> Option<(Vec<f64>, Vec<Drive>)> {
+        let (n, h) = (self.course.n(), self.course.h_m);
+        let merge = (libm::round(TUBE_INTERVAL_M / h) as usize).clamp(1, n);
+        let step = (self.reach_j_kg(merge) / TUBE_STEPS).clamp(0.1, 2.0);
+        let half = TUBE_HALF_STEPS * step;
+        let low: Vec<f64> =
+            e.iter().zip(&self.e_min).map(|(e, low)| (e - half).max(low.min(*e))).collect();
+        let high: Vec<f64> =
+            e.iter().zip(&self.e_max).map(|(e, high)| (e + half).min(*high)).collect();
+        self.searched(tables, beta_g_s, (&low, &high), merge, step)
+    }
+
+    /// Energy that full traction adds in `merge` intervals, J/kg.
+    fn reach_j_kg(&self, merge: usize) -> f64 {
+        let (truck, n) = (self.truck, self.course.n());
         let v = libm::sqrt(2.0 * self.e_max.iter().sum::<f64>() / (n + 1) as f64);
-        let reach = truck.traction_m_s2(truck.strongest_gear(v), v) * course.h_m * merge as f64;
-        let step = (reach / (SEARCH_STEPS * fineness)).clamp(0.5, 4.0);
+        truck.traction_m_s2(truck.strongest_gear(v), v) * self.course.h_m * merge as f64
+    }
+
+    fn searched(
+        &self,
+        tables: &EngineTables,
+        beta_g_s: f64,
+        bounds: (&[f64], &[f64]),
+        merge: usize,
+        step_e: f64,
+    ) -> Option<(Vec<f64>, Vec<Drive>)> {
+        let n = self.course.n();
         let end = match self.terminal {
             Terminal::Fixed(e) => Some(e),
             Terminal::Soft { .. } => None,
         };
-        let bounds = (self.e_min.as_slice(), self.e_max.as_slice());
-        let grid = SearchGrid::new(course, merge, step, bounds, self.start_e, end);
+        let grid = SearchGrid::new(self.course, merge, step_e, bounds, self.start_e, end);
         let prices = SearchPrices {
             beta_g_s,
             shift_fuel_g: self.tuning.shift_fuel_g,
             accel_penalty_g_s3_m2: self.tuning.accel_penalty_g_s3_m2,
-            brake_m_s2: course.brake_m_s2,
+            brake_m_s2: self.course.brake_m_s2,
             free_cut: true,
         };
         let start = match self.start_gear {
             Some(Drive::Gear(g)) => Some(g),
             _ => None,
         };
-        let Some(path) = search(truck, tables, &grid, &prices, start) else {
-            return (otherwise.0.to_vec(), otherwise.1.to_vec());
-        };
+        let path = search(self.truck, tables, &grid, &prices, start)?;
         let coarse = grid.n();
         let (mut e, mut gears) = (Vec::with_capacity(n + 1), Vec::with_capacity(n));
         for k in 0..coarse {
@@ -173,7 +213,7 @@ impl Problem<'_> {
         for (k, value) in e.iter_mut().enumerate() {
             *value = value.min(self.e_max[k]).max(self.e_min[k]);
         }
-        (e, gears)
+        Some((e, gears))
     }
 }
 
@@ -190,6 +230,7 @@ pub fn iterate(
     let n = course.n();
     let mut sub = Subproblem::default();
     let mut now = Profile { beta_g_s, ..Profile::failed((start, gears)) };
+    hold_minimum(problem, &mut now);
     for _ in 0..iterations.most {
         let beta = match problem.time {
             TimeRule::Price(beta) => beta,
@@ -240,6 +281,37 @@ pub fn iterate(
         }
     }
     now
+}
+
+/// Makes a profile that can be driven above the minimum speed. Where full load in the planned gears
+/// ends below it, the truck comes faster; where that is not enough either, the strongest gear
+/// drives until the planned one holds the speed.
+fn hold_minimum(problem: &Problem<'_>, now: &mut Profile) {
+    let (truck, course) = (problem.truck, problem.course);
+    let n = course.n();
+    let mut floor = problem.e_min.clone();
+    for k in (0..n).rev() {
+        let before = needed_before(truck, course, k, now.gears[k], floor[k], floor[k + 1]);
+        floor[k] = before.min(problem.e_max[k]).max(floor[k]);
+    }
+    let mut e = problem.start_e;
+    let mut rescued = false;
+    for k in 0..n {
+        let target = now.e_j_kg[k + 1].max(floor[k + 1]);
+        now.e_j_kg[k + 1] = target;
+        let mut leg = drive_leg(truck, course, k, now.gears[k], e, target);
+        let needed = if rescued { e.min(target) } else { problem.e_min[k + 1] };
+        rescued = leg.end_e_j_kg < needed * (1.0 - 1e-6);
+        if rescued {
+            let strongest = Drive::Gear(truck.strongest_gear(libm::sqrt(2.0 * e)) as u8);
+            let other = drive_leg(truck, course, k, strongest, e, target);
+            if other.end_e_j_kg > leg.end_e_j_kg {
+                now.gears[k] = strongest;
+                leg = other;
+            }
+        }
+        e = leg.end_e_j_kg;
+    }
 }
 
 /// Gears chosen anew along a profile, among those used nearby, at the profile's worth of traction.

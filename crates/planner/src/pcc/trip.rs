@@ -135,8 +135,9 @@ pub struct TripResult {
     pub e_max_j_kg: Vec<f64>,
 }
 
-/// Energy steps of the gear searches, relative: two grids, so that neither's rounding decides.
-const SEARCH_FINENESS: [f64; 2] = [1.0, 1.3];
+/// Successive linearisations with gears from a search: the first over the whole band, the others in
+/// a tube around the best so far.
+const TUBE_ROUNDS: usize = 2;
 
 /// Overspeed of the second baseline, m/s.
 const OVERSPEED_M_S: f64 = 5.0 / 3.6;
@@ -274,29 +275,37 @@ impl Trip {
         let cruise = (self.cruise.e_j_kg.as_slice(), self.cruise.drive.as_slice());
         let mut beta = beta_g_s;
         let mut best: Option<(f64, Driven, Profile)> = None;
-        for fineness in SEARCH_FINENESS {
-            let (mut e, mut gears) = problem.first_profile(&self.tables, beta, fineness, cruise);
-            for _ in 0..2 {
-                // One subproblem tells the price of time, which the gear search is asked again with.
-                let probe = Iterations { most: 1, ..Iterations::TRIP };
-                let first = iterate(&problem, &e, &gears, beta, probe, solver);
-                let settled = (first.beta_g_s - beta).abs() < 0.1 * beta;
-                beta = first.beta_g_s;
-                if settled {
-                    break;
-                }
-                (e, gears) = problem.first_profile(&self.tables, beta, fineness, cruise);
+        let (mut e, mut gears) = problem.first_profile(&self.tables, beta, 1.0, cruise);
+        for _ in 0..2 {
+            // One subproblem tells the price of time, which the gear search is asked again with.
+            let probe = Iterations { most: 1, ..Iterations::TRIP };
+            let first = iterate(&problem, &e, &gears, beta, probe, solver);
+            let settled = (first.beta_g_s - beta).abs() < 0.1 * beta;
+            beta = first.beta_g_s;
+            if settled {
+                break;
             }
+            (e, gears) = problem.first_profile(&self.tables, beta, 1.0, cruise);
+        }
+        for round in 0..TUBE_ROUNDS {
             let profile = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
             beta = profile.beta_g_s;
             let refined = refined_gears(&problem, &profile);
-            let e = profile.e_j_kg.clone();
+            let centre = profile.e_j_kg.clone();
             let other = (refined != profile.gears)
-                .then(|| iterate(&problem, &e, &refined, beta, Iterations::TRIP, solver));
+                .then(|| iterate(&problem, &centre, &refined, beta, Iterations::TRIP, solver));
             self.keep_better(&problem, trip_time_s, profile, &mut best);
             if let Some(other) = other {
                 self.keep_better(&problem, trip_time_s, other, &mut best);
             }
+            // Around the best so far the gears are searched anew, at the course's own step.
+            let Some((_, driven, kept)) = best.as_ref().filter(|_| round + 1 < TUBE_ROUNDS) else {
+                break;
+            };
+            let found = problem.tube_profile(&self.tables, kept.beta_g_s, &driven.e_j_kg);
+            let Some(found) = found.filter(|(_, g)| *g != kept.gears) else { break };
+            beta = kept.beta_g_s;
+            (e, gears) = found;
         }
         // Part load below zero wheel force: either charged as it is, or cut where it is least.
         problem.cut = CutModel::Charged;
@@ -341,7 +350,8 @@ impl Trip {
     }
 
     /// Drives a profile and keeps it if it costs less than the best so far: fuel, and the price of
-    /// time for what it is late, tenfold so that a late plan wins only where none is in time.
+    /// time for what it is late or lies below the minimum speed, tenfold so that such a plan wins
+    /// only where there is no other.
     fn keep_better(
         &self,
         problem: &Problem<'_>,
@@ -362,7 +372,14 @@ impl Trip {
         );
         let price = profile.beta_g_s.max(self.beta_guess());
         let late = (driven.trip_time_s() - trip_time_s * (1.0 + 1e-5)).max(0.0);
-        let cost = driven.total_fuel_g() + 10.0 * price * late;
+        let slow: f64 = driven
+            .e_j_kg
+            .iter()
+            .zip(&self.e_min)
+            .filter(|(e, low)| **e < **low * (1.0 - 1e-3))
+            .map(|(e, low)| self.course.h_m / libm::sqrt(2.0 * e) * (1.0 - libm::sqrt(e / low)))
+            .sum();
+        let cost = driven.total_fuel_g() + 10.0 * price * (late + slow);
         if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
             *best = Some((cost, driven, profile));
         }

@@ -1,129 +1,458 @@
-//! Dynamic-programming reference for the speed planner: gears, nonlinear fuel map, trip time.
+//! Dynamic-programming reference for the speed planner, with its own truck, its own edges and its
+//! own search: nothing here is linearised, and nothing is shared with the planner but the statement
+//! of the problem (data sheet, grades, speed bounds, both end speeds, price of a shift, Eq. 18).
 //!
-//! The joint search of `planner::pcc::search` on fine grids, with the price of time found by
-//! bisection; the result is driven by the truth. Nothing is linearised around a profile, and every
-//! path on the grid is a drivable plan, so the reference is an upper bound of the optimum that
-//! closes in on it as the grid is refined. The whole band is searched at 100 m; then a tube around
-//! the best path at the course's own step is searched and moved until it rests.
+//! Backward value iteration over specific energy `E` and gear at the course's own step. From each
+//! grid energy the truck is taken through the interval to a set of end energies between coasting and
+//! full load (coasting with the brakes where the ceiling lies lower); the value at the end is
+//! interpolated, so that edges do not have to end on the grid. A policy is only as good as its grid,
+//! but its cost is not an estimate: the trip is driven forward from the start with the best of all
+//! edges at every step, refined between the candidates. A second, finer grid follows in a tube
+//! around that trip. The price of time is adjusted until the trip lasts as long as asked.
+//!
+//! `beta` is the price of time in g/s; every other quantity is SI.
 
-use planner::pcc::drive::{Driven, drive_profile};
-use planner::pcc::search::{EngineTables, SearchGrid, SearchPath, SearchPrices, search};
-use planner::pcc::trip::Trip;
-use planner::pcc::truck::Drive;
+use tractrix_core::{FuelModel, GRAVITY_M_S2, PowertrainLimits, VehicleLimits};
 
-/// A driven path.
-pub(crate) struct Reference {
-    /// The trip.
-    pub(crate) driven: Driven,
-    /// Price of time, g/s.
-    pub(crate) beta_g_s: f64,
+/// Price of a speed below the lowest allowed one, g per J/kg: far above any fuel.
+const SLOW_PRICE: f64 = 60.0;
+/// Step of the truck's tables in energy, J/kg.
+const TABLE_STEP: f64 = 0.25;
+/// Full load or lowest engine speed under load: 1.25 times idle.
+const LUGGING: f64 = 1.25;
+
+/// The statement of a problem.
+pub(crate) struct Task<'a> {
+    pub(crate) limits: &'a VehicleLimits,
+    /// Interval length, m.
+    pub(crate) h_m: f64,
+    pub(crate) sin: &'a [f64],
+    pub(crate) cos: &'a [f64],
+    /// Bounds of the energy per node, J/kg.
+    pub(crate) e_min: &'a [f64],
+    pub(crate) e_max: &'a [f64],
+    pub(crate) start_e: f64,
+    pub(crate) end_e: f64,
+    /// Fuel per shift, g.
+    pub(crate) shift_g: f64,
+    /// Eq. 18's `k_a`, g s³/m².
+    pub(crate) accel_g: f64,
+    /// Largest planned brake deceleration, m/s².
+    pub(crate) brake_m_s2: f64,
+    /// Whether the objective charges the flow at vanishing torque at fuel cut-off too. A map that
+    /// jumps there otherwise makes full power and cut-off by turns optimal on a flat road.
+    pub(crate) charge_cut: bool,
 }
 
-/// Grid sizes of a reference.
+/// Grid sizes.
 #[derive(Clone, Copy)]
-pub(crate) struct Fineness {
-    /// Energy steps that full traction covers per interval, whole band at 100 m.
-    pub(crate) coarse: f64,
-    /// Same in the tube at the course's step.
-    pub(crate) fine: f64,
-    /// Half width of the tube in steps.
-    pub(crate) half: f64,
+pub(crate) struct Resolution {
+    /// Energy steps: whole band, then in the tube, J/kg.
+    pub(crate) band_j_kg: f64,
+    pub(crate) tube_j_kg: f64,
+    /// Half width of the tube, J/kg.
+    pub(crate) half_j_kg: f64,
+    /// Candidates between coasting and full load.
+    pub(crate) levels: usize,
+    /// Adjustments of the price of time per grid.
+    pub(crate) prices: usize,
 }
 
-/// For the tests that always run.
-pub(crate) const QUICK: Fineness = Fineness { coarse: 16.0, fine: 20.0, half: 24.0 };
+/// For tests that always run.
+pub(crate) const QUICK: Resolution =
+    Resolution { band_j_kg: 2.0, tube_j_kg: 0.5, half_j_kg: 10.0, levels: 16, prices: 4 };
 /// For the campaign.
-pub(crate) const FINE: Fineness = Fineness { coarse: 24.0, fine: 24.0, half: 40.0 };
+pub(crate) const FINE: Resolution =
+    Resolution { band_j_kg: 1.0, tube_j_kg: 0.25, half_j_kg: 12.0, levels: 24, prices: 5 };
+/// Half of every step of [`FINE`].
+pub(crate) const FINEST: Resolution =
+    Resolution { band_j_kg: 0.5, tube_j_kg: 0.125, half_j_kg: 12.0, levels: 48, prices: 5 };
 
-fn timed(
-    trip: &Trip,
-    tables: &EngineTables,
-    grid: &SearchGrid,
-    goal_s: f64,
-    guess: f64,
-    passes: usize,
-) -> Option<(SearchPath, f64)> {
-    let (mut low, mut high) = (0.0f64, f64::INFINITY);
-    let mut beta = guess;
-    let mut best: Option<(SearchPath, f64)> = None;
-    for _ in 0..passes {
-        let prices = SearchPrices {
-            beta_g_s: beta,
-            shift_fuel_g: trip.tuning.shift_fuel_g,
-            accel_penalty_g_s3_m2: trip.tuning.accel_penalty_g_s3_m2,
-            brake_m_s2: trip.course.brake_m_s2,
-            free_cut: true,
+/// A driven trip.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Trip {
+    /// Energies per node, gears per interval.
+    pub(crate) e: Vec<f64>,
+    pub(crate) gears: Vec<usize>,
+    /// Fuel with shifts, g; time, s.
+    pub(crate) fuel_g: f64,
+    pub(crate) time_s: f64,
+    pub(crate) shifts: usize,
+    /// `∫ k_a a² dt`, g.
+    pub(crate) accel_g: f64,
+    /// Price of time it was found with, g/s.
+    pub(crate) beta: f64,
+}
+
+/// One gear at one energy.
+#[derive(Clone, Copy, Default)]
+struct At {
+    /// Overrun drag and full load per mass, m/s².
+    drag: f64,
+    full: f64,
+    friction_nm: f64,
+}
+
+/// A gear of the truck over energy.
+struct Gear {
+    index: usize,
+    /// Engine radians per metre, efficiency, (mass + rotating mass)/mass.
+    i: f64,
+    eta: f64,
+    mu: f64,
+    /// Energies between which the gear drives.
+    from_e: f64,
+    to_e: f64,
+    at: Vec<At>,
+}
+
+/// What an interval takes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edge {
+    pub(crate) fuel_g: f64,
+    /// Fuel of the objective, g.
+    charged_g: f64,
+    pub(crate) time_s: f64,
+    pub(crate) accel_g: f64,
+    /// Force per mass asked of driveline (positive) or brakes (negative), and full load, m/s².
+    pub(crate) need: f64,
+    pub(crate) full: f64,
+}
+
+pub(crate) struct Plant<'a> {
+    task: &'a Task<'a>,
+    fuel: &'a FuelModel,
+    gears: Vec<Gear>,
+    mass: f64,
+    /// ρ CdA / m.
+    air: f64,
+    slowest_w: f64,
+    aux_w: f64,
+}
+
+fn figures(p: &PowertrainLimits, mass: f64, i: f64, eta: f64, v: f64) -> At {
+    let w = (v * i).max(LUGGING * p.idle_speed_rad_s);
+    let friction_nm = p.friction_nm.at(w);
+    let lost = (friction_nm + p.auxiliary_power_w / w) * i / eta;
+    let net = (p.full_load_nm.at(w) - p.auxiliary_power_w / w).max(0.0);
+    At { drag: lost / mass, full: (net * i * eta + lost) / mass, friction_nm }
+}
+
+impl<'a> Plant<'a> {
+    pub(crate) fn new(task: &'a Task<'a>) -> Self {
+        let p = &task.limits.powertrain;
+        let mass = task.limits.road_load.mass_kg;
+        let top = task.e_max.iter().copied().fold(0.0, f64::max);
+        let bottom = task.e_min.iter().copied().fold(f64::MAX, f64::min);
+        let slowest_w = LUGGING * p.idle_speed_rad_s;
+        let gears = (0..p.gear_ratios.len())
+            .map(|g| {
+                let i = p.gear_ratios[g] * p.final_drive_ratio / p.wheel_radius_m;
+                let eta = p.gear_efficiency_frac[g];
+                let from = if g == 0 { 0.0 } else { slowest_w / i };
+                let to = p.max_speed_rad_s / i;
+                let rows = (top / TABLE_STEP) as usize + 3;
+                let at = (0..rows)
+                    .map(|r| figures(p, mass, i, eta, (2.0 * r as f64 * TABLE_STEP).sqrt()))
+                    .collect();
+                let mu = 1.0 + p.rotating_mass_kg[g] / mass;
+                Gear { index: g, i, eta, mu, from_e: 0.5 * from * from, to_e: 0.5 * to * to, at }
+            })
+            .filter(|gear| gear.from_e < top && gear.to_e > bottom)
+            .collect();
+        Self {
+            task,
+            fuel: &p.fuel,
+            gears,
+            mass,
+            air: task.limits.road_load.air_density_kg_m3 * task.limits.road_load.cd_a_m2 / mass,
+            slowest_w,
+            aux_w: p.auxiliary_power_w,
+        }
+    }
+
+    fn resistance(&self, k: usize, mean: f64) -> f64 {
+        let roll = self.task.limits.road_load.rolling_coeff;
+        self.air * mean + GRAVITY_M_S2 * (self.task.sin[k] + roll * self.task.cos[k])
+    }
+
+    /// Interval `k` from `e0` to `e1` in gear `slot` with the figures `at` of its mean energy.
+    fn edge_at(&self, k: usize, slot: usize, e0: f64, e1: f64, at: At) -> Edge {
+        let gear = &self.gears[slot];
+        let h = self.task.h_m;
+        let mean = 0.5 * (e0 + e1);
+        let accel = (e1 - e0) / h;
+        let need = gear.mu * accel + at.drag + self.resistance(k, mean);
+        let time_s = 2.0 * h / ((2.0 * e0).sqrt() + (2.0 * e1).sqrt());
+        let w = ((2.0 * mean).sqrt() * gear.i).max(self.slowest_w);
+        let pull = (need - at.drag) * self.mass;
+        let net = if pull >= 0.0 { pull / (gear.i * gear.eta) } else { pull * gear.eta / gear.i };
+        let gas_nm = net + at.friction_nm + self.aux_w / w;
+        let injects = need >= 1e-7 && gas_nm >= 1e-6;
+        let charged_g = if injects || self.task.charge_cut {
+            time_s * self.fuel.rate_g_s(w, gas_nm.max(1e-6), at.friction_nm)
+        } else {
+            0.0
         };
-        let path = search(&trip.truck, tables, grid, &prices, None)?;
-        if path.time_s <= goal_s {
-            high = beta;
-            let close = goal_s - path.time_s < 1e-3 * goal_s;
-            if best.as_ref().is_none_or(|(b, _)| path.time_s > b.time_s) {
-                best = Some((path, beta));
+        let fuel_g = if injects { charged_g } else { 0.0 };
+        let accel_g = time_s * self.task.accel_g * accel * accel;
+        Edge { fuel_g, charged_g, time_s, accel_g, need, full: at.full }
+    }
+
+    /// The same with exact figures, for checking a profile that was planned elsewhere.
+    pub(crate) fn exact_edge(&self, k: usize, gear: usize, e0: f64, e1: f64) -> Option<Edge> {
+        let slot = self.gears.iter().position(|g| g.index == gear)?;
+        let g = &self.gears[slot];
+        let p = &self.task.limits.powertrain;
+        Some(self.edge_at(k, slot, e0, e1, figures(p, self.mass, g.i, g.eta, (e0 + e1).sqrt())))
+    }
+
+    fn table(&self, slot: usize, mean: f64) -> At {
+        let rows = &self.gears[slot].at;
+        let x = (mean / TABLE_STEP).max(0.0);
+        let r = (x as usize).min(rows.len() - 2);
+        let (a, b, f) = (rows[r], rows[r + 1], x - r as f64);
+        let mix = |a: f64, b: f64| a + f * (b - a);
+        At {
+            drag: mix(a.drag, b.drag),
+            full: mix(a.full, b.full),
+            friction_nm: mix(a.friction_nm, b.friction_nm),
+        }
+    }
+
+    /// Highest energy after interval `k` with `share` of the full load (0: coasting).
+    fn reach(&self, k: usize, slot: usize, e0: f64, share: f64) -> f64 {
+        let mut e1 = e0;
+        for _ in 0..4 {
+            let mean = 0.5 * (e0 + e1);
+            let at = self.table(slot, mean);
+            let surplus = share * at.full - at.drag - self.resistance(k, mean);
+            e1 = (e0 + surplus * self.task.h_m / self.gears[slot].mu).max(0.2);
+        }
+        e1
+    }
+
+    fn drives(&self, slot: usize, mean: f64) -> bool {
+        (self.gears[slot].from_e..=self.gears[slot].to_e).contains(&mean)
+    }
+}
+
+/// Values over energy and gear at one node: `W(E, gear engaged before)`, shift included.
+struct Layer {
+    low: i64,
+    count: usize,
+    values: Vec<f64>,
+}
+
+struct Sweep<'a> {
+    plant: &'a Plant<'a>,
+    step: f64,
+    beta: f64,
+    levels: usize,
+    layers: Vec<Layer>,
+}
+
+impl<'a> Sweep<'a> {
+    fn energy(&self, index: i64) -> f64 {
+        self.plant.task.end_e + index as f64 * self.step
+    }
+
+    /// Value after arriving at node `k` with `e` in gear `slot`; outside the grid it is held and the
+    /// distance charged.
+    fn value(&self, k: usize, slot: usize, e: f64) -> f64 {
+        let layer = &self.layers[k];
+        let x = (e - self.energy(layer.low)) / self.step;
+        let last = (layer.count - 1) as f64;
+        let inside = x.clamp(0.0, last);
+        let outside = (x - inside).abs() * self.step;
+        let i = (inside as usize).min(layer.count.saturating_sub(2));
+        let m = self.plant.gears.len();
+        let at = |i: usize| layer.values[i.min(layer.count - 1) * m + slot];
+        let f = inside - i as f64;
+        let (a, b) = (at(i), at(i + 1));
+        let slow = (self.plant.task.e_min[k] - e).max(0.0);
+        a + f * (b - a) + SLOW_PRICE * (outside + slow)
+    }
+
+    /// Cost of an edge with what follows it.
+    fn total(&self, k: usize, slot: usize, e0: f64, e1: f64) -> f64 {
+        let at = self.plant.table(slot, 0.5 * (e0 + e1));
+        let edge = self.plant.edge_at(k, slot, e0, e1, at);
+        edge.charged_g + edge.accel_g + self.beta * edge.time_s + self.value(k + 1, slot, e1)
+    }
+
+    /// The best end energy in a gear, with its cost; `None` where the gear does not drive.
+    fn best(&self, k: usize, slot: usize, e0: f64, refine: bool) -> Option<(f64, f64)> {
+        let plant = self.plant;
+        let ceiling = plant.task.e_max[k + 1];
+        let coast = plant.reach(k, slot, e0, 0.0);
+        let low = coast.min(ceiling);
+        let strongest = plant.task.brake_m_s2 * plant.task.h_m / plant.gears[slot].mu;
+        if coast - low > strongest || !plant.drives(slot, 0.5 * (e0 + low)) {
+            return None;
+        }
+        let high = plant.reach(k, slot, e0, 1.0).min(ceiling).max(low);
+        let width = (high - low) / self.levels as f64;
+        let mut best = (low, self.total(k, slot, e0, low));
+        if width > 1e-9 {
+            for i in 1..=self.levels {
+                let e1 = low + width * i as f64;
+                let cost = self.total(k, slot, e0, e1);
+                if cost < best.1 {
+                    best = (e1, cost);
+                }
             }
-            if close || beta <= 1e-6 {
+            if refine && best.0 > low {
+                best = self.golden(k, slot, e0, (best.0 - width).max(low), best.0, best);
+                best = self.golden(k, slot, e0, best.0, (best.0 + width).min(high), best);
+            }
+            // Constant speed is a candidate of its own.
+            if e0 > low && e0 < high {
+                let cost = self.total(k, slot, e0, e0);
+                if cost < best.1 {
+                    best = (e0, cost);
+                }
+            }
+        }
+        plant.drives(slot, 0.5 * (e0 + best.0)).then_some(best)
+    }
+
+    fn golden(
+        &self,
+        k: usize,
+        slot: usize,
+        e0: f64,
+        mut low: f64,
+        mut high: f64,
+        mut best: (f64, f64),
+    ) -> (f64, f64) {
+        for _ in 0..12 {
+            let (a, b) = (high - 0.618 * (high - low), low + 0.618 * (high - low));
+            let (fa, fb) = (self.total(k, slot, e0, a), self.total(k, slot, e0, b));
+            for (e, f) in [(a, fa), (b, fb)] {
+                if f < best.1 {
+                    best = (e, f);
+                }
+            }
+            if fa < fb { high = b } else { low = a }
+        }
+        best
+    }
+
+    /// Fills the layers backward; `around` limits them to a tube of half width `half`.
+    fn backward(&mut self, around: Option<(&[f64], f64)>) {
+        let task = self.plant.task;
+        let (n, m) = (task.sin.len(), self.plant.gears.len());
+        self.layers = (0..=n)
+            .map(|k| {
+                let (mut low, mut high) = (task.e_min[k] - 1.0, task.e_max[k]);
+                if let Some((e, half)) = around {
+                    low = low.max(e[k] - half).min(e[k]);
+                    high = high.min(e[k] + half).max(low);
+                }
+                let low = ((low - task.end_e) / self.step).floor() as i64;
+                let high = ((high - task.end_e) / self.step).ceil() as i64;
+                let count = (high - low).max(1) as usize + 1;
+                Layer { low, count, values: vec![0.0; count * m] }
+            })
+            .collect();
+        for i in 0..self.layers[n].count {
+            let missing = (task.end_e - self.energy(self.layers[n].low + i as i64)).max(0.0);
+            self.layers[n].values[i * m..(i + 1) * m].fill(10.0 * SLOW_PRICE * missing);
+        }
+        for k in (0..n).rev() {
+            for i in 0..self.layers[k].count {
+                let e0 = self.energy(self.layers[k].low + i as i64).max(0.3);
+                let mut own: Vec<f64> = (0..m)
+                    .map(|slot| self.best(k, slot, e0, false).map_or(1e9, |(_, cost)| cost))
+                    .collect();
+                let other = own.iter().copied().fold(f64::INFINITY, f64::min) + task.shift_g;
+                for value in &mut own {
+                    *value = value.min(other);
+                }
+                self.layers[k].values[i * m..(i + 1) * m].copy_from_slice(&own);
+            }
+        }
+    }
+
+    /// Drives the trip.
+    #[allow(clippy::expect_used)]
+    fn forward(&self) -> Trip {
+        let task = self.plant.task;
+        let mut trip = Trip { e: vec![task.start_e], beta: self.beta, ..Trip::default() };
+        let mut before = None;
+        for k in 0..task.sin.len() {
+            let e0 = trip.e[k];
+            let mut best = (f64::INFINITY, 0, e0);
+            for slot in 0..self.plant.gears.len() {
+                let Some((e1, cost)) = self.best(k, slot, e0, true) else { continue };
+                let shift = before.is_some_and(|b| b != slot);
+                let cost = cost + if shift { task.shift_g } else { 0.0 };
+                if cost < best.0 {
+                    best = (cost, slot, e1);
+                }
+            }
+            let (_, slot, e1) = best;
+            let gear = self.plant.gears[slot].index;
+            let edge = self.plant.exact_edge(k, gear, e0, e1).expect("a gear of the plant");
+            if before.is_some_and(|b| b != slot) {
+                trip.shifts += 1;
+                trip.fuel_g += task.shift_g;
+            }
+            before = Some(slot);
+            trip.fuel_g += edge.fuel_g;
+            trip.time_s += edge.time_s;
+            trip.accel_g += edge.accel_g;
+            trip.e.push(e1);
+            trip.gears.push(gear);
+        }
+        trip
+    }
+}
+
+impl Trip {
+    /// Fuel that the trip would take in `time_s`, to first order: a second is worth `beta`.
+    pub(crate) fn fuel_at(&self, time_s: f64) -> f64 {
+        self.fuel_g + self.beta * (self.time_s - time_s)
+    }
+}
+
+/// The reference for a trip that lasts `goal_s`, found from the guess `beta` of the price of time.
+pub(crate) fn reference(task: &Task<'_>, goal_s: f64, beta: f64, r: Resolution) -> Trip {
+    let plant = Plant::new(task);
+    let mut best = Trip { beta, ..Trip::default() };
+    for (step, tube) in [(r.band_j_kg, false), (r.tube_j_kg, true), (r.tube_j_kg, true)] {
+        let centre = best.e.clone();
+        // Root of the trip time over the price, by secants within the bracket.
+        let mut seen: Vec<Trip> = Vec::new();
+        let mut price = best.beta;
+        for _ in 0..r.prices {
+            let mut sweep =
+                Sweep { plant: &plant, step, beta: price, levels: r.levels, layers: Vec::new() };
+            sweep.backward(tube.then_some((centre.as_slice(), r.half_j_kg)));
+            seen.push(sweep.forward());
+            let late = |t: &Trip| t.time_s - goal_s;
+            seen.sort_by(|a, b| a.beta.total_cmp(&b.beta));
+            if seen.iter().any(|t| late(t).abs() < 2e-5 * goal_s) {
                 break;
             }
-        } else {
-            low = beta;
+            let slow = seen.iter().rfind(|t| late(t) > 0.0);
+            let fast = seen.iter().find(|t| late(t) <= 0.0);
+            price = match (slow, fast) {
+                (Some(a), Some(b)) => {
+                    let f = (late(a) / (late(a) - late(b))).clamp(0.1, 0.9);
+                    a.beta + f * (b.beta - a.beta)
+                }
+                (Some(a), None) => 1.15 * a.beta + 0.02,
+                (None, Some(b)) if b.beta < 0.02 => break,
+                (None, Some(b)) => 0.85 * b.beta - 0.01,
+                (None, None) => break,
+            }
+            .max(0.0);
         }
-        beta = match (low, high) {
-            (l, h) if h.is_infinite() => (l * 1.1).max(0.1),
-            (0.0, h) if h < 0.3 => 0.0,
-            (0.0, h) => h * 0.9,
-            (l, h) => 0.5 * (l + h),
-        };
+        let near = |t: &Trip| (t.time_s - goal_s).abs();
+        seen.sort_by(|a, b| near(a).total_cmp(&near(b)));
+        best = seen.swap_remove(0);
     }
     best
-}
-
-/// The reference of a trip in `goal_s` to the end energy `end_e`; `None` if no path is fast enough.
-pub(crate) fn reference(trip: &Trip, goal_s: f64, end_e: f64, f: Fineness) -> Option<Reference> {
-    let n = trip.course.n();
-    let top = trip.e_max.iter().copied().fold(0.0, f64::max);
-    let tables = EngineTables::new(&trip.truck, top + 5.0);
-    let v = (2.0 * end_e).sqrt();
-    let pull = trip.truck.traction_m_s2(trip.truck.strongest_gear(v), v);
-    let start = trip.cruise.e_j_kg[0];
-    let bounds = (trip.e_min.as_slice(), trip.e_max.as_slice());
-    let merge = (100.0 / trip.course.h_m).round().clamp(1.0, n as f64) as usize;
-    let step = pull * trip.course.h_m * merge as f64 / f.coarse;
-    let grid = SearchGrid::new(&trip.course, merge, step, bounds, start, Some(end_e));
-    let (path, mut beta) = timed(trip, &tables, &grid, goal_s, trip.beta_guess(), 16)?;
-    let coarse = grid.n();
-    let mut centre: Vec<f64> = (0..=n)
-        .map(|i| {
-            let k = (i * coarse / n).min(coarse - 1);
-            let (a, b) = (SearchGrid::node(n, coarse, k), SearchGrid::node(n, coarse, k + 1));
-            let t = (i as f64 - a as f64) / (b as f64 - a as f64);
-            path.e_j_kg[k] + t * (path.e_j_kg[k + 1] - path.e_j_kg[k])
-        })
-        .collect();
-    let step = pull * trip.course.h_m / f.fine;
-    let half = step * f.half;
-    let mut best: Option<SearchPath> = None;
-    for round in 0..8 {
-        let low: Vec<f64> =
-            (0..=n).map(|k| trip.e_min[k].max(centre[k] - half).min(trip.e_max[k])).collect();
-        let high: Vec<f64> =
-            (0..=n).map(|k| trip.e_max[k].min(centre[k] + half).max(low[k])).collect();
-        let grid = SearchGrid::new(&trip.course, 1, step, (&low, &high), start, Some(end_e));
-        let passes = if round == 0 { 10 } else { 4 };
-        let Some((found, price)) = timed(trip, &tables, &grid, goal_s, beta, passes) else { break };
-        beta = price;
-        let moved =
-            found.e_j_kg.iter().zip(&centre).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        centre.copy_from_slice(&found.e_j_kg);
-        let cost = |p: &SearchPath| p.cost_g;
-        let gain = best.as_ref().map_or(f64::INFINITY, |b| cost(b) - cost(&found));
-        best = Some(found);
-        if moved < 0.9 * half || gain.abs() < 1.0 {
-            break;
-        }
-    }
-    let path = best?;
-    let gears: Vec<Drive> = path.gears.iter().map(|&g| Drive::Gear(g)).collect();
-    let shift = trip.tuning.shift_fuel_g;
-    let driven = drive_profile(&trip.truck, &trip.course, &path.e_j_kg, &gears, &[], shift);
-    Some(Reference { driven, beta_g_s: beta })
 }

@@ -1,0 +1,81 @@
+//! The structured solver asks for memory only while its workspace grows.
+#![expect(unsafe_code, reason = "an allocator cannot be written without")]
+
+#[allow(dead_code)]
+#[path = "support/pcc/corpus.rs"]
+mod corpus;
+#[path = "support/data_sheet.rs"]
+mod data_sheet;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use planner::pcc::drive::drive_profile;
+use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
+use planner::pcc::solution::{Solution, SolveStatus};
+use planner::pcc::sqp::CutModel;
+use planner::pcc::structured::Structured;
+use planner::pcc::trip::{Trip, TripRequest};
+use planner::pcc::{SpeedBand, Tuning};
+
+thread_local! {
+    static REQUESTS: Cell<usize> = const { Cell::new(0) };
+}
+
+/// The system's allocator, counting the requests of each thread.
+struct Counting;
+
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let _ = REQUESTS.try_with(|r| r.set(r.get() + 1));
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn requests_of(run: impl FnOnce()) -> usize {
+    let before = REQUESTS.with(Cell::get);
+    run();
+    REQUESTS.with(Cell::get) - before
+}
+
+#[test]
+fn after_the_first_solve_neither_linearisation_nor_solution_allocates() {
+    let (_, profile) = corpus::roads().swap_remove(4);
+    let limits = data_sheet::reference_limits();
+    let request = TripRequest {
+        profile: &profile,
+        truck: &limits,
+        band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
+        trip_time_s: None,
+        eco_roll: false,
+        tuning: Tuning::default(),
+    };
+    let trip = Trip::new(&request).unwrap();
+    let (truck, course, gears) = (&trip.truck, &trip.course, &trip.cruise.drive);
+    // Another profile, so that the second solve is another problem than the first.
+    let slower: Vec<f64> = trip.cruise.e_j_kg.iter().map(|e| 0.97 * e).collect();
+    let slower = drive_profile(truck, course, &slower, gears, &[], 0.0).e_j_kg;
+    let (mut sub, mut solver, mut found) =
+        (Subproblem::default(), Structured::default(), Solution::default());
+    let mut solve = |e: &[f64], terminal: Terminal, time: TimeRule| {
+        sub.linearise(truck, course, &trip.tuning, e, gears, 3.0, CutModel::Hull);
+        sub.e_max.copy_from_slice(&trip.e_max);
+        for (low, e) in sub.e_min.iter_mut().zip(e) {
+            *low = 0.8 * e;
+        }
+        solver.solve_into(&sub, terminal, time, &mut found);
+        assert_eq!(found.status, SolveStatus::Solved);
+    };
+    let end = trip.cruise.e_j_kg[course.n()];
+    let fixed = (Terminal::Fixed(end), TimeRule::AtMost(1.01 * trip.cruise.trip_time_s()));
+    let soft = (Terminal::Soft { reference: end, pay: 3.3, credit: 2.4 }, TimeRule::Price(3.0));
+    assert!(requests_of(|| solve(&trip.cruise.e_j_kg, fixed.0, fixed.1)) > 0, "counts nothing");
+    assert_eq!(requests_of(|| solve(&slower, soft.0, soft.1)), 0);
+    assert_eq!(requests_of(|| solve(&slower, fixed.0, fixed.1)), 0);
+}
