@@ -10,6 +10,7 @@ use sim::{Scenario, Traffic, TrafficKind};
 use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
 use traffic_client::Mode;
 use traffic_client::calibrate::{Effort, calibrate};
+use traffic_client::native::TrafficConfig;
 use traffic_client::replay::{Frame, Recording, Row, write_parquet};
 use traffic_client::stats::Observer;
 
@@ -45,7 +46,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "MEASURED", num_args = 1..)]
     calibrate: Vec<PathBuf>,
     /// Generations of the calibration's search.
-    #[arg(long, default_value_t = 40, requires = "calibrate")]
+    #[arg(long, default_value_t = 25, requires = "calibrate")]
     generations: usize,
     /// Lanes of the recorded road.
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(1..=12))]
@@ -86,6 +87,8 @@ enum Direction {
 
 /// Between two looks at the traffic, and two rows of a trajectory, s.
 const LOOK_S: f64 = 0.5;
+/// What the seeds of a search differ by from those of a run.
+const SEARCH_SEED: u64 = 0x5eed_0000;
 /// Time that is observed where nobody says otherwise, s.
 const DURATION_S: f64 = 300.0;
 
@@ -206,7 +209,8 @@ fn calibrated(
     };
     let effort = Effort { generations: args.generations, seed, ..Effort::default() };
     output::note("calibrating ...");
-    let base = scenario.traffic.demand(seed);
+    // Judged later with traffic that was not driven in the search.
+    let base = scenario.traffic.demand(seed ^ SEARCH_SEED);
     let found = calibrate(road, &learned.recordings, &learned.samples, &base, effort)
         .map_err(Failure::input)?;
     let mut scenario = scenario;
@@ -224,7 +228,7 @@ fn calibrated(
     let absolute = std::fs::canonicalize(file).map_err(|e| Failure::file(file, e))?;
     traffic.replay.file = Some(absolute.display().to_string());
     traffic.replay.carriageway = args.carriageway.into();
-    traffic.native = found.config;
+    traffic.native = TrafficConfig { seed, ..found.config };
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
     let text = toml::to_string(&scenario).map_err(Failure::work)?;
     write(&args.out.join("calibrated.toml"), &text)?;
