@@ -49,7 +49,7 @@ const MEMBERS: usize = 18;
 const SCALE: f64 = 0.6;
 const CROSSOVER: f64 = 0.8;
 /// Between two looks of the observer, ticks.
-const LOOK_TICKS: u64 = 5;
+const LOOK_TICKS: u64 = 10;
 
 /// How thoroughly is searched.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +64,7 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { generations: 25, trial_s: 90.0, seed: 1 }
+        Self { generations: 25, trial_s: 100.0, seed: 1 }
     }
 }
 
@@ -96,6 +96,9 @@ pub fn calibrate(
         return Err(TrafficError::Config { why });
     }
     let start = with_measured_demand(base, road, recordings, measured);
+    let mut measured = measured.clone();
+    measured.sort();
+    let measured = &measured;
     // All drives together must look like the recordings, and each of them nearly so: otherwise the
     // search would find what one seed happens to do.
     let cost = |knobs: &Knobs| -> Result<f64, TrafficError> {
@@ -159,7 +162,7 @@ pub fn distance(a: &Samples, b: &Samples) -> f64 {
         .sum()
 }
 
-/// Native traffic alone on a road for a while after its warm-up, looked at twice a second.
+/// Native traffic alone on a road for a while after its warm-up, looked at every second.
 ///
 /// # Errors
 /// [`TrafficError`] for a configuration or road that cannot be used.
@@ -201,7 +204,8 @@ fn with_measured_demand(
     let flow_1_s = 1.05 * measured.flow_1_h(lanes_m) / 3600.0;
     config.spawn_probability = (flow_1_s * config.spawn_interval_s).clamp(0.0, 1.0);
     config.initial_density_1_km = Some(density_1_km.min(120.0));
-    config.warm_up_s = 60.0;
+    // Long enough for the speed beyond the end to reach back over a stretch of a kilometre.
+    config.warm_up_s = 150.0;
     let tracks = || recordings.iter().flat_map(|r| &r.tracks);
     let share = |class| {
         tracks().filter(|t| t.class == class).count() as f64 / tracks().count().max(1) as f64

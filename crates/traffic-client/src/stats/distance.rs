@@ -4,15 +4,20 @@
 //! the samples (the mean distance that the samples have to be moved). F, G are the empirical
 //! distribution functions; sizes may differ.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 /// Both distribution functions as steps over all sample values: calls `see(x, next_x, |F - G|)`.
 fn walk(a: &[f64], b: &[f64], mut see: impl FnMut(f64, f64, f64)) {
-    let sorted = |values: &[f64]| {
+    fn sorted(values: &[f64]) -> Cow<'_, [f64]> {
+        if values.is_sorted() {
+            return Cow::Borrowed(values);
+        }
         let mut values = values.to_vec();
-        values.sort_by(f64::total_cmp);
-        values
-    };
+        values.sort_unstable_by(f64::total_cmp);
+        Cow::Owned(values)
+    }
     let (a, b) = (sorted(a), sorted(b));
     let (mut i, mut j) = (0, 0);
     loop {

@@ -85,6 +85,13 @@ impl Samples {
         self.values[quantity as usize] = values;
     }
 
+    /// Sorts the samples, for whoever compares with them again and again.
+    pub fn sort(&mut self) {
+        for values in &mut self.values {
+            values.sort_by(f64::total_cmp);
+        }
+    }
+
     /// Adds the samples of another observation of the same kind.
     pub fn append(&mut self, other: &Self) {
         for (mine, theirs) in self.values.iter_mut().zip(&other.values) {

@@ -1,7 +1,7 @@
 //! Flow over density: the fundamental diagram of the native engine, and of SUMO where it is
 //! installed, with the drivers of a scenario.
 //!
-//! A straight level road is filled with a density; after half a minute, vehicles on a window in its
+//! A straight level road is filled with a density; after 20 s, vehicles on a window in its
 //! middle are counted (Edie: flow = way / area, density = time / area) until whatever happens at
 //! the ends of the road could reach the window. Densities up to where traffic stands.
 
@@ -21,13 +21,12 @@ use crate::output;
 use crate::provenance::Provenance;
 
 /// Length of the road and its window, m.
-const ROAD_M: f64 = 6000.0;
-const WINDOW_M: std::ops::Range<f64> = 3000.0..4000.0;
+const ROAD_M: f64 = 3500.0;
+const WINDOW_M: std::ops::Range<f64> = 1800.0..2300.0;
 /// Observed time, s.
-const WATCHED_S: std::ops::Range<f64> = 30.0..110.0;
+const WATCHED_S: std::ops::Range<f64> = 20.0..70.0;
 /// Densities, vehicles per km and lane.
-const DENSITIES_1_KM: [f64; 12] =
-    [4.0, 8.0, 12.0, 16.0, 20.0, 25.0, 30.0, 40.0, 50.0, 65.0, 80.0, 100.0];
+const DENSITIES_1_KM: [f64; 10] = [5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 65.0, 80.0];
 
 #[derive(Debug, Clone, Copy, Serialize)]
 struct Point {
