@@ -27,6 +27,17 @@ const PRESSURE_LAPSE_1_M: f64 = 1.2e-4;
 /// Fall of the standard atmosphere's temperature, K/m (ISO 2533).
 const TEMPERATURE_LAPSE_K_M: f64 = 6.5e-3;
 
+impl Weather {
+    /// Temperature, K, and pressure, Pa, of the air so many metres above the start of the road.
+    #[must_use]
+    pub fn air_at(&self, climbed_m: f64) -> (f64, f64) {
+        (
+            self.air_temperature_k - TEMPERATURE_LAPSE_K_M * climbed_m,
+            self.air_pressure_pa * (1.0 - PRESSURE_LAPSE_1_M * climbed_m),
+        )
+    }
+}
+
 impl SimTruck {
     /// A truck at its start: in the middle of a lane, along it, rolling.
     ///
@@ -102,12 +113,13 @@ impl SimTruck {
         let start_z = self.road.at(0.0, 0.0).z_m;
         let climbed = at.z_m - start_z;
         let w = &self.weather;
+        let (air_temperature_k, air_pressure_pa) = w.air_at(climbed);
         RoadPatch {
             grade_rad: at.grade_rad,
             bank_rad: at.bank_rad,
             wind_m_s: (w.wind_x_m_s, w.wind_y_m_s),
-            air_temperature_k: w.air_temperature_k - TEMPERATURE_LAPSE_K_M * climbed,
-            air_pressure_pa: w.air_pressure_pa * (1.0 - PRESSURE_LAPSE_1_M * climbed),
+            air_temperature_k,
+            air_pressure_pa,
             altitude_m: at.z_m,
             adhesion_coeff: w.adhesion_coeff,
         }

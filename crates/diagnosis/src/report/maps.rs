@@ -59,7 +59,9 @@ pub(super) fn maps(learned: &[Rows], held: &[Rows], clean: &[Rows]) -> Vec<Resid
         .filter_map(|m| {
             let [before, after] = rms(learned, *m)?;
             let floor = floor(clean, *m).unwrap_or(after).max(1e-12);
-            Some((before / floor, *m))
+            // what the extension changed first, then what is large
+            let relief = (before * before - after * after) / (floor * floor);
+            Some((1e3 * relief + before / floor, *m))
         })
         .collect();
     modules.sort_by(|a, b| b.0.total_cmp(&a.0));

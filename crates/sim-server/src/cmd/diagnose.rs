@@ -13,6 +13,8 @@ use crate::output;
 use crate::progress::Stages;
 use crate::provenance::Provenance;
 
+mod folder;
+mod recorded;
 mod report;
 mod threads;
 
@@ -25,7 +27,8 @@ pub(crate) struct Args {
     /// The truck file that the simulation uses, or a built-in name.
     #[arg(long, value_name = "T")]
     truck: String,
-    /// Folder of measured drives: drives.toml and one table per drive.
+    /// Folder of measured drives (drives.toml and one table per drive), or recordings of this
+    /// program: a run.mcap, its folder, or a folder of such folders.
     #[arg(long, value_name = "DIR")]
     drives: PathBuf,
     /// Drives of the same truck and logger that are in order: noise and tolerances are learned
@@ -50,8 +53,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let truck = TruckParameters::load(&args.truck).map_err(Failure::input)?;
     let plant = Plant::of_truck(&truck).map_err(Failure::input)?;
-    let drives = read(&args.drives)?;
-    let baseline = args.baseline.as_deref().map(read).transpose()?;
+    let drives = read(&args.drives, &truck, &args.out.join("drives"))?;
+    let made = args.out.join("baseline");
+    let baseline = args.baseline.as_deref().map(|b| read(b, &truck, &made)).transpose()?;
     let options = Options { hold_out: args.hold_out.clone(), ..Options::default() };
     let stages = Stages::start();
     let found = diagnosis::diagnose(
@@ -91,10 +95,24 @@ fn named(path: &Path) -> String {
     path.file_name().map_or_else(|| "drives".to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
-fn read(folder: &Path) -> Result<DriveSet, Failure> {
-    if !folder.is_dir() {
-        return Err(Failure::file(folder, "no such folder"));
-    }
+/// Measured drives: a folder as the contract has it, or recordings of this program, from which
+/// such a folder is made at `made`.
+fn read(path: &Path, truck: &TruckParameters, made: &Path) -> Result<DriveSet, Failure> {
+    let folder = if path.join("drives.toml").is_file() {
+        path
+    } else {
+        let recordings = recorded::recordings(path);
+        if recordings.is_empty() && !path.is_dir() {
+            return Err(Failure::file(path, "no such folder, and no recording"));
+        }
+        if recordings.is_empty() {
+            return Err(Failure::file(path, "no drives.toml and no run.mcap in it"));
+        }
+        let tables: Result<Vec<_>, _> =
+            recordings.iter().map(|r| recorded::table(r, truck)).collect();
+        folder::write(made, &truck.name, &tables?)?;
+        made
+    };
     diagnosis::read_drives(folder).map_err(Failure::input)
 }
 

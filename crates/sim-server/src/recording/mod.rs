@@ -10,9 +10,11 @@
 
 mod bodies;
 mod file;
+mod layout;
 mod recorder;
 pub(crate) mod recover;
 pub(crate) mod ros;
 
 pub(crate) use bodies::Combination;
+pub(crate) use layout::Layout;
 pub(crate) use recorder::{Recording, RunHeader};

@@ -66,13 +66,14 @@ pub(crate) fn recover(path: &Path) -> Result<Recovered, Failure> {
 }
 
 /// The records of a file in order, chunks opened.
-struct Records<R> {
+pub(crate) struct Records<R> {
     input: R,
     reader: LinearReader,
 }
 
 impl<R: Read> Records<R> {
-    fn new(input: R, file_bytes: u64) -> Self {
+    /// Reads a file of so many bytes.
+    pub(crate) fn new(input: R, file_bytes: u64) -> Self {
         let limit = usize::try_from(file_bytes).unwrap_or(usize::MAX);
         let options = LinearReaderOptions::default()
             .with_skip_end_magic(true)
@@ -81,7 +82,7 @@ impl<R: Read> Records<R> {
     }
 
     /// The next record's code and body; none at the end of the file.
-    fn next_record(&mut self) -> McapResult<Option<(u8, Vec<u8>)>> {
+    pub(crate) fn next_record(&mut self) -> McapResult<Option<(u8, Vec<u8>)>> {
         while let Some(event) = self.reader.next_event() {
             match event? {
                 LinearReadEvent::ReadRequest(bytes) => {
@@ -151,7 +152,7 @@ impl Copy {
 
 /// Whether the lengths inside an attachment record fit the record: two times, name, media type,
 /// data, CRC. The crate's parser relies on it.
-fn attachment_is_whole(body: &[u8]) -> bool {
+pub(crate) fn attachment_is_whole(body: &[u8]) -> bool {
     let length_at = |at: usize, bytes: usize| -> Option<usize> {
         let field = body.get(at..at.checked_add(bytes)?)?;
         let value = field.iter().rev().fold(0_u64, |acc, &b| (acc << 8) | u64::from(b));

@@ -1,0 +1,86 @@
+//! A folder of measured drives, written as the contract has it: `drives.toml` and CSV tables.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::failure::Failure;
+
+/// Table rate of a drive, s.
+pub(super) const STEP_S: f64 = 0.05;
+
+/// One drive.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Table {
+    /// Name of the drive.
+    pub(super) name: String,
+    /// Mass on the load sheet, kg.
+    pub(super) reported_mass_kg: f64,
+    /// Columns by name, of equal length; the first is `time_s`.
+    pub(super) columns: Vec<(&'static str, Vec<f64>)>,
+}
+
+impl Table {
+    /// A table with these columns and no rows.
+    pub(super) fn new(name: String, columns: &[&'static str]) -> Self {
+        let columns = columns.iter().map(|c| (*c, Vec::new())).collect();
+        Self { name, reported_mass_kg: 0.0, columns }
+    }
+
+    /// Appends a row.
+    pub(super) fn push(&mut self, row: &[f64]) {
+        for ((_, column), value) in self.columns.iter_mut().zip(row) {
+            column.push(*value);
+        }
+    }
+
+    fn csv(&self) -> String {
+        let rows = self.columns.first().map_or(0, |c| c.1.len());
+        let mut text = self.columns.iter().map(|c| c.0).collect::<Vec<_>>().join(",");
+        for i in 0..rows {
+            text.push('\n');
+            for (k, (_, column)) in self.columns.iter().enumerate() {
+                if k > 0 {
+                    text.push(',');
+                }
+                // a millionth is below the resolution of every channel
+                let value = (column.get(i).copied().unwrap_or(f64::NAN) * 1e6).round() / 1e6;
+                text.push_str(&value.to_string());
+            }
+        }
+        text.push('\n');
+        text
+    }
+}
+
+#[derive(Serialize)]
+struct Index<'a> {
+    schema: u32,
+    truck: &'a str,
+    drive: Vec<Entry>,
+}
+
+#[derive(Serialize)]
+struct Entry {
+    name: String,
+    file: String,
+    reported_mass_kg: f64,
+    tyres_warm_at_start: bool,
+}
+
+/// Writes a folder of drives of a truck, all started with cold tyres.
+pub(super) fn write(folder: &Path, truck: &str, tables: &[Table]) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, e))?;
+    let entry = |t: &'_ Table| Entry {
+        name: t.name.clone(),
+        file: format!("{}.csv", t.name),
+        reported_mass_kg: t.reported_mass_kg,
+        tyres_warm_at_start: false,
+    };
+    let index = Index { schema: 1, truck, drive: tables.iter().map(entry).collect() };
+    for table in tables {
+        super::write(&folder.join(format!("{}.csv", table.name)), &table.csv())?;
+    }
+    let text = toml::to_string(&index).map_err(Failure::work)?;
+    super::write(&folder.join("drives.toml"), &text)
+}

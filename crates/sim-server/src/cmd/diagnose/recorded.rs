@@ -1,0 +1,246 @@
+//! Our own recordings as measured drives: `run.mcap` to a folder of drives.
+//!
+//! A recording holds the true state of the simulated truck, without noise and delays. GPS speed,
+//! accelerometer, coolant and the road's curvature are not in it.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use dynamics::{TruckModel, TruckParameters};
+use mcap::records::{Record, op};
+use sim::Scenario;
+
+use super::folder::{STEP_S, Table};
+use crate::failure::Failure;
+use crate::recording::Layout;
+use crate::recording::recover::{Records, attachment_is_whole};
+
+/// Name of a recording in its folder.
+const RECORDING: &str = "run.mcap";
+/// Part of a step by which a sample may come early: recordings have whole nanoseconds.
+const EARLY_S: f64 = 1e-6;
+
+/// Recordings at `path`: the file, the folder of a run, or a folder of such folders. Empty if
+/// there is none.
+pub(super) fn recordings(path: &Path) -> Vec<PathBuf> {
+    if path.extension().is_some_and(|e| e == "mcap") && path.is_file() {
+        return vec![path.to_owned()];
+    }
+    let alone = path.join(RECORDING);
+    if alone.is_file() {
+        return vec![alone];
+    }
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+    let mut found: Vec<PathBuf> =
+        entries.map(|e| e.path().join(RECORDING)).filter(|p| p.is_file()).collect();
+    found.sort();
+    found
+}
+
+/// Fields of `/truck/state` that are read, in the order of the message.
+const STATE: [&str; 17] = [
+    "s_m",
+    "grade_rad",
+    "speed_m_s",
+    "accel_y_m_s2",
+    "yaw_rate_rad_s",
+    "trailer_yaw_rate_rad_s",
+    "steering_wheel_rad",
+    "engine_speed_rpm",
+    "engine_torque_nm",
+    "brake_pressure_pa",
+    "gear",
+    "shift_in_progress",
+    "fuel_rate_g_s",
+    "accelerator_pedal_frac",
+    "xbr_decel_m_s2",
+    "brake_mode",
+    "command_retarder_frac",
+];
+/// Fields of `/odom` that are read.
+const ODOMETRY: [&str; 3] =
+    ["pose.pose.position.z", "pose.pose.orientation.z", "pose.pose.orientation.w"];
+
+const COLUMNS: [&str; 20] = [
+    "time_s",
+    "s_map_m",
+    "speed_m_s",
+    "gps_altitude_m",
+    "heading_rad",
+    "accelerator_pedal_frac",
+    "engine_torque_percent",
+    "engine_speed_rpm",
+    "gear",
+    "shift_in_process",
+    "engine_brake_frac",
+    "xbr_decel_m_s2",
+    "brake_pressure_kpa",
+    "steering_wheel_rad",
+    "yaw_rate_rad_s",
+    "trailer_yaw_rate_rad_s",
+    "accel_y_m_s2",
+    "fuel_rate_g_s",
+    "grade_frac",
+    "ambient_temp_degc",
+];
+
+/// Reads a recording as a drive of `truck`.
+///
+/// # Errors
+/// [`Failure::Input`] if it is no recording of this program, or holds no state.
+pub(super) fn table(path: &Path, truck: &TruckParameters) -> Result<Table, Failure> {
+    let input = File::open(path).map_err(|e| Failure::file(path, e))?;
+    let bytes = input.metadata().map_err(|e| Failure::file(path, e))?.len();
+    let mut records = Records::new(BufReader::new(input), bytes);
+    let folder = path.parent().and_then(Path::file_name);
+    let name = folder.map_or_else(|| "run".to_owned(), |n| n.to_string_lossy().into_owned());
+    let mut reader = Reader {
+        definitions: BTreeMap::new(),
+        topics: BTreeMap::new(),
+        altitude_heading: None,
+        scenario: None,
+        table: Table::new(name, &COLUMNS),
+        reference_torque_nm: truck.engine.reference_torque_nm,
+        last_s: f64::NEG_INFINITY,
+        start_z_m: None,
+        climbed_m: Vec::new(),
+    };
+    while let Some((code, body)) = records.next_record().map_err(|e| Failure::file(path, e))? {
+        let damaged = code == op::ATTACHMENT && !attachment_is_whole(&body);
+        let record = if damaged { None } else { mcap::parse_record(code, &body).ok() };
+        let Some(record) = record else { return Err(Failure::file(path, "a record is damaged")) };
+        reader.take(record);
+        if code == op::DATA_END {
+            break;
+        }
+    }
+    let scenario = reader.scenario.as_deref().ok_or_else(|| {
+        Failure::file(path, "no recording of this program (no scenario is attached), or torn")
+    })?;
+    let scenario =
+        Scenario::from_toml_str(&path.display().to_string(), scenario).map_err(Failure::input)?;
+    let mut table = reader.table;
+    let climbed = reader.climbed_m.iter();
+    if let Some((_, ambient)) = table.columns.iter_mut().find(|c| c.0 == "ambient_temp_degc") {
+        *ambient = climbed.map(|z| scenario.weather.air_at(*z).0 - ZERO_DEGC_K).collect();
+    }
+    let empty_kg = TruckModel::new(truck.clone(), 0.0).map_err(Failure::input)?.mass_kg();
+    table.reported_mass_kg = empty_kg + scenario.truck.payload_kg;
+    Ok(table)
+}
+
+/// 0 °C in K.
+const ZERO_DEGC_K: f64 = 273.15;
+
+struct Reader {
+    definitions: BTreeMap<u16, Layout>,
+    topics: BTreeMap<u16, (Topic, Layout, Vec<usize>)>,
+    altitude_heading: Option<(f64, f64)>,
+    scenario: Option<String>,
+    table: Table,
+    reference_torque_nm: f64,
+    last_s: f64,
+    start_z_m: Option<f64>,
+    climbed_m: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Topic {
+    State,
+    Odometry,
+}
+
+impl Reader {
+    fn take(&mut self, record: Record<'_>) {
+        match record {
+            Record::Schema { header, data } => {
+                let layout = Layout::of(&String::from_utf8_lossy(&data));
+                self.definitions.insert(header.id, layout);
+            }
+            Record::Channel(c) => {
+                let topic = match c.topic.as_str() {
+                    "/truck/state" => (Topic::State, &STATE[..]),
+                    "/odom" => (Topic::Odometry, &ODOMETRY[..]),
+                    _ => return,
+                };
+                let Some(layout) = self.definitions.get(&c.schema_id) else { return };
+                let wanted: Option<Vec<usize>> = topic.1.iter().map(|n| layout.index(n)).collect();
+                if let Some(wanted) = wanted {
+                    self.topics.insert(c.id, (topic.0, layout.clone(), wanted));
+                }
+            }
+            Record::Message { header, data } => {
+                let Some((topic, layout, wanted)) = self.topics.get(&header.channel_id) else {
+                    return;
+                };
+                let time_s = header.log_time as f64 * 1e-9;
+                if *topic == Topic::State && time_s < self.last_s + STEP_S - EARLY_S {
+                    return;
+                }
+                match (topic, layout.read(&data, wanted).as_deref()) {
+                    (Topic::Odometry, Some([z, qz, qw])) => {
+                        self.altitude_heading = Some((*z, 2.0 * qz.atan2(*qw)));
+                    }
+                    (Topic::State, Some(state)) => self.state(time_s, state),
+                    _ => {}
+                }
+            }
+            Record::Attachment { header, data, .. } if header.name == "scenario.toml" => {
+                self.scenario = Some(String::from_utf8_lossy(&data).into_owned());
+            }
+            _ => {}
+        }
+    }
+
+    fn state(&mut self, time_s: f64, state: &[f64]) {
+        let (Some((z, heading)), Ok(state)) =
+            (self.altitude_heading, <[f64; STATE.len()]>::try_from(state))
+        else {
+            return;
+        };
+        let [
+            s,
+            grade,
+            speed,
+            accel_y,
+            yaw,
+            trailer_yaw,
+            wheel,
+            rpm,
+            torque,
+            pressure,
+            gear,
+            shift,
+            fuel,
+            pedal,
+            decel,
+            mode,
+            retarder,
+        ] = state;
+        self.last_s = time_s;
+        self.climbed_m.push(z - *self.start_z_m.get_or_insert(z));
+        self.table.push(&[
+            time_s,
+            s,
+            speed,
+            z,
+            heading,
+            pedal,
+            100.0 * torque / self.reference_torque_nm,
+            rpm,
+            gear,
+            shift,
+            retarder,
+            if mode == 0.0 { 0.0 } else { decel },
+            pressure * 1e-3,
+            wheel,
+            yaw,
+            trailer_yaw,
+            accel_y,
+            fuel,
+            grade.tan(),
+        ]);
+    }
+}
