@@ -59,3 +59,64 @@ fn an_unknown_truck_and_an_unknown_drive_are_named() {
     let held = ["--truck", "reference", "--drives", &at, "--hold-out", "d9", "--out", &out];
     assert!(refused(&[&["diagnose"], &held[..]].concat()).contains("d9"));
 }
+
+fn diagnosed(arguments: &[&str]) -> serde_json::Value {
+    let output = support::server(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn text(path: &Path) -> String {
+    path.display().to_string()
+}
+
+/// A folder of recorded runs of the reference truck, and the folder's path.
+fn runs(at: &Path, payloads_kg: &[&str]) -> String {
+    for payload in payloads_kg {
+        let out = text(&at.join(format!("run_{payload}")));
+        let options = ["--truck", "reference", "--payload-kg", payload, "--headless", "--out"];
+        let run = [&["run", "highway", "--duration", "300"], &options[..], &[&out]].concat();
+        assert!(support::server(&run).status.success());
+    }
+    text(at)
+}
+
+#[test]
+fn our_own_recordings_of_the_same_truck_leave_nothing_to_explain() {
+    let folder = tempfile::tempdir().unwrap();
+    let drives = runs(&folder.path().join("runs"), &["12000", "30000"]);
+    let baseline = runs(&folder.path().join("others"), &["4000", "20000"]);
+    let out = text(&folder.path().join("out"));
+    let given = ["diagnose", "--truck", "reference", "--drives", &drives, "--baseline", &baseline];
+    let found = diagnosed(&[&given[..], &["--out", &out, "--json"]].concat());
+    assert_eq!(found["verdict"], "nothing_to_explain", "{found}");
+    assert!(found["extended_truck"].is_null() && found["causes"].as_array().unwrap().is_empty());
+    assert!(folder.path().join("out/report.html").is_file());
+}
+
+/// The whole loop: what was hidden is named, the extended truck loads and drives, the gain on the
+/// drives held out is significant.
+#[test]
+fn the_example_finds_what_it_hid_and_its_truck_drives() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = text(folder.path());
+    let found = diagnosed(&["diagnose", "--example", "--seed", "1", "--out", &out, "--json"]);
+    for key in ["schema", "version", "git_revision", "seed", "verdict", "wrong", "not_observable"] {
+        assert!(!found[key].is_null(), "{key}");
+    }
+    assert_eq!(found["verdict"], "explained");
+    assert_eq!(found["causes"][0]["id"], found["hidden"]["id"], "{found}");
+    assert_eq!(found["gain"]["significant"], true);
+    let errors = found["gain"]["errors"].as_array().unwrap();
+    assert!(errors.iter().any(|e| e["claimed"] == true), "{errors:?}");
+    let extended = text(&folder.path().join(found["extended_truck"].as_str().unwrap()));
+    let run = ["run", "highway-empty", "--truck", &extended, "--duration", "5", "--headless"];
+    let at = text(&folder.path().join("run"));
+    assert!(support::server(&[&run[..], &["--out", &at]].concat()).status.success());
+    let page = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    assert!(page.contains("plotly.js v"), "the page is whole");
+    for place in ["{{style}}", "{{plotly}}", "{{data}}", "{{script}}"] {
+        assert!(!page.contains(place), "{place}");
+    }
+    assert!(!page.contains("src=\"http"), "and needs nothing else");
+}

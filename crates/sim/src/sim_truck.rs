@@ -107,7 +107,8 @@ impl SimTruck {
     }
 
     /// Road (as the map has it for where the truck is) and weather.
-    fn patch(&self) -> RoadPatch {
+    #[must_use]
+    pub fn patch(&self) -> RoadPatch {
         let mapped_m = self.model.parameters().instruments.map_position_m(self.ego.s_m);
         let at = self.road.at(mapped_m, self.ego.d_m);
         let start_z = self.road.at(0.0, 0.0).z_m;

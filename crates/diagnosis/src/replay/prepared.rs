@@ -227,8 +227,10 @@ impl Prepared {
             valid[M::Shift as usize] = vec![true; self.shifts.len()];
         }
         if self.has(&[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm]) {
-            valid[M::Fuel as usize] =
-                rows(M::Fuel, &|a, b| (a..b).all(|i| self.engaged[i] && self.speed[i] > 3.0));
+            valid[M::Fuel as usize] = rows(M::Fuel, &|a, b| {
+                // no fuel at all is the overrun cut-off of the engine control, not its map
+                (a..b).all(|i| self.engaged[i] && self.speed[i] > 3.0 && self.fuel[i] > 0.0)
+            });
         }
         if self.has(&[C::SteeringWheelRad]) {
             let moving: Vec<bool> = {

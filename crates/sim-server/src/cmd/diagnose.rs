@@ -3,21 +3,22 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use diagnosis::report::Report;
-use diagnosis::{Diagnosis, DriveSet, Extension, Options, Plant, Verdict};
+use diagnosis::{DriveSet, Options, Plant};
 use dynamics::TruckParameters;
-use serde_json::Value;
 
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Stages;
-use crate::provenance::Provenance;
 
+mod example;
 mod folder;
+mod logger;
 mod recorded;
 mod report;
+mod results;
 mod threads;
 
+use results::Results;
 use threads::Threads;
 
 /// Finds what the simulation gets wrong on measured drives and names the cause. Writes
@@ -25,12 +26,12 @@ use threads::Threads;
 #[derive(Debug, Parser)]
 pub(crate) struct Args {
     /// The truck file that the simulation uses, or a built-in name.
-    #[arg(long, value_name = "T")]
-    truck: String,
+    #[arg(long, value_name = "T", required_unless_present = "example")]
+    truck: Option<String>,
     /// Folder of measured drives (drives.toml and one table per drive), or recordings of this
     /// program: a run.mcap, its folder, or a folder of such folders.
-    #[arg(long, value_name = "DIR")]
-    drives: PathBuf,
+    #[arg(long, value_name = "DIR", required_unless_present = "example")]
+    drives: Option<PathBuf>,
     /// Drives of the same truck and logger that are in order: noise and tolerances are learned
     /// from them.
     #[arg(long, value_name = "DIR")]
@@ -38,7 +39,11 @@ pub(crate) struct Args {
     /// Drives on which the gain is measured [default: the last quarter, if there are four].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     hold_out: Vec<String>,
-    /// Seed of the intervals of the gain.
+    /// The whole loop on a built-in example: measures a simulated truck with a hidden effect that
+    /// the seed draws, diagnoses it, and runs the simulator with the extended truck.
+    #[arg(long, conflicts_with_all = ["truck", "drives", "baseline"])]
+    example: bool,
+    /// Seed of the example, and of the intervals of the gain.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Folder of the results.
@@ -51,42 +56,49 @@ pub(crate) struct Args {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let truck = TruckParameters::load(&args.truck).map_err(Failure::input)?;
-    let plant = Plant::of_truck(&truck).map_err(Failure::input)?;
-    let drives = read(&args.drives, &truck, &args.out.join("drives"))?;
-    let made = args.out.join("baseline");
-    let baseline = args.baseline.as_deref().map(|b| read(b, &truck, &made)).transpose()?;
-    let options = Options { hold_out: args.hold_out.clone(), ..Options::default() };
+    let threads = Threads::available();
     let stages = Stages::start();
-    let found = diagnosis::diagnose(
-        &plant,
-        &drives,
-        baseline.as_ref(),
-        &options,
-        &Threads::available(),
-        &mut |p| stages.show(&stage(p)),
-    );
-    let mut found = found.map_err(Failure::input)?;
+    let hidden = if args.example {
+        stages.show("measuring a simulated truck with a hidden effect");
+        Some(example::measure(&args.out, args.seed, &threads)?)
+    } else {
+        None
+    };
+    let folder = |given: &Option<PathBuf>, made: &str| {
+        if args.example { Some(args.out.join(made)) } else { given.clone() }
+    };
+    let missing = |what: &str| Failure::Input(format!("{what} is missing"));
+    let truck_name = args.truck.as_deref().or(hidden.as_ref().map(|_| example::TRUCK));
+    let truck_name = truck_name.ok_or_else(|| missing("--truck"))?;
+    let drives_at = folder(&args.drives, "drives").ok_or_else(|| missing("--drives"))?;
+    let baseline_at = folder(&args.baseline, "baseline");
+
+    let truck = TruckParameters::load(truck_name).map_err(Failure::input)?;
+    let plant = Plant::of_truck(&truck).map_err(Failure::input)?;
+    let drives = read(&drives_at, &truck, &args.out.join("drives"), args.seed)?;
+    let made = args.out.join("baseline");
+    let baseline = baseline_at.as_deref().map(|b| read(b, &truck, &made, args.seed)).transpose()?;
+    let options = Options { hold_out: args.hold_out.clone(), ..Options::default() };
+    let progress = &mut |p| stages.show(&stage(p));
+    let found =
+        diagnosis::diagnose(&plant, &drives, baseline.as_ref(), &options, &threads, progress)
+            .map_err(Failure::input)?;
     stages.show("drawing the report");
     let figures =
         diagnosis::report::report(&plant, &drives, baseline.as_ref(), &options, &found, args.seed)
             .map_err(Failure::work)?;
-    stages.finish();
-
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
-    let extension = write_extension(args, &truck, &mut found)?;
-    let json = to_json(args, &found, &extension, &figures)?;
-    let text = serde_json::to_string_pretty(&json).map_err(Failure::work)?;
-    write(&args.out.join("diagnosis.json"), &text)?;
-    let overlay = extension.overlay.as_ref().map(toml::to_string).transpose();
-    let overlay = overlay.map_err(Failure::work)?;
-    let page = report::page(&found, &json, &figures, &named(&args.drives), overlay.as_deref());
-    write(&args.out.join("report.html"), &page)?;
-    output::result(&if args.json {
-        text
-    } else {
-        sentences(&found, &extension, &figures, &args.out)
-    });
+    let mut results = Results::new(found, figures, named(&drives_at), args.seed);
+    results.extend(&truck, truck_name, &args.out)?;
+    if let Some(hidden) = hidden {
+        stages.show("running the simulator with the extended truck");
+        let overlay = results.extension.overlay.as_ref();
+        let closed_loop = example::close_the_loop(&hidden, overlay)?;
+        results.example = Some((hidden, closed_loop));
+    }
+    stages.finish();
+    let text = results.write(&args.out)?;
+    output::result(&if args.json { text } else { results.sentences(&args.out) });
     Ok(())
 }
 
@@ -97,7 +109,7 @@ fn named(path: &Path) -> String {
 
 /// Measured drives: a folder as the contract has it, or recordings of this program, from which
 /// such a folder is made at `made`.
-fn read(path: &Path, truck: &TruckParameters, made: &Path) -> Result<DriveSet, Failure> {
+fn read(path: &Path, truck: &TruckParameters, made: &Path, seed: u64) -> Result<DriveSet, Failure> {
     let folder = if path.join("drives.toml").is_file() {
         path
     } else {
@@ -109,14 +121,15 @@ fn read(path: &Path, truck: &TruckParameters, made: &Path) -> Result<DriveSet, F
             return Err(Failure::file(path, "no drives.toml and no run.mcap in it"));
         }
         let tables: Result<Vec<_>, _> =
-            recordings.iter().map(|r| recorded::table(r, truck)).collect();
+            recordings.iter().map(|r| recorded::table(r, truck, seed)).collect();
         folder::write(made, &truck.name, &tables?)?;
         made
     };
     diagnosis::read_drives(folder).map_err(Failure::input)
 }
 
-pub(crate) fn write(path: &Path, text: &str) -> Result<(), Failure> {
+/// Writes a file of the results.
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| Failure::file(path, e))
 }
 
@@ -130,115 +143,4 @@ fn stage(p: diagnosis::Progress) -> String {
         P::Gain => "replaying the drives that were held out".to_owned(),
         _ => "working".to_owned(),
     }
-}
-
-/// Writes the extended truck (and the truck file that it builds on, if it is not built in), and
-/// sets its name in the diagnosis.
-fn write_extension(
-    args: &Args,
-    truck: &TruckParameters,
-    found: &mut Diagnosis,
-) -> Result<Extension, Failure> {
-    let name = file_name(&truck.name);
-    let built_in = TruckParameters::names().any(|n| n == args.truck);
-    let base = if built_in { args.truck.clone() } else { format!("{name}.base.toml") };
-    let origin = format!("diagnosis of {} on {}", found.truck, named(&args.drives));
-    let extension =
-        diagnosis::extend(truck, &base, &format!("{name}.extended"), &found.causes, &origin);
-    found.extended_truck = extension.overlay.as_ref().map(|_| format!("{name}.extended.toml"));
-    if let (Some(overlay), Some(file)) = (&extension.overlay, &found.extended_truck) {
-        if !built_in {
-            let text = toml::to_string(truck).map_err(Failure::work)?;
-            write(&args.out.join(&base), &text)?;
-        }
-        let text = toml::to_string(overlay).map_err(Failure::work)?;
-        let path = args.out.join(file);
-        write(&path, &text)?;
-        TruckParameters::load(&path.display().to_string()).map_err(Failure::work)?;
-    }
-    Ok(extension)
-}
-
-/// A truck's name as a file name.
-fn file_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
-}
-
-/// `diagnosis.json`: the diagnosis with its provenance in front.
-fn to_json(
-    args: &Args,
-    found: &Diagnosis,
-    extension: &Extension,
-    figures: &Report,
-) -> Result<Value, Failure> {
-    let mut json = serde_json::to_value(Provenance::of_seed(args.seed)).map_err(Failure::work)?;
-    let rest = serde_json::to_value(found).map_err(Failure::work)?;
-    if let (Some(all), Value::Object(rest)) = (json.as_object_mut(), rest) {
-        all.extend(rest);
-        let lost: Vec<Value> = extension
-            .not_carried
-            .iter()
-            .map(|n| serde_json::json!({ "id": n.id, "why": n.why }))
-            .collect();
-        all.insert("not_carried".to_owned(), lost.into());
-        if let Some(Value::Object(gain)) = all.get_mut("gain") {
-            let errors = serde_json::to_value(&figures.gains).map_err(Failure::work)?;
-            gain.insert("errors".to_owned(), errors);
-        }
-    }
-    Ok(json)
-}
-
-/// The diagnosis for a terminal.
-fn sentences(found: &Diagnosis, extension: &Extension, figures: &Report, out: &Path) -> String {
-    let mut lines = vec![verdict(found)];
-    for cause in &found.causes {
-        lines.push(format!("  {} (evidence {:.0} nats)", cause.sentence, cause.evidence));
-        lines.push(format!("    {}", diagnosis::report::advice(cause.id)));
-        for other in &cause.confused_with {
-            lines.push(format!("    could be {}: {}", other.id, other.why));
-        }
-    }
-    if let Some(u) = &found.unknown {
-        let signals = u.signals.join(", ");
-        lines.push(format!("  outside the catalogue: {}; it follows {signals}", u.shape));
-    }
-    if let Some(g) = &found.gain {
-        let held_out = g.held_out.join(", ");
-        let mut claimed = figures.gains.iter().filter(|g| g.claimed).peekable();
-        if claimed.peek().is_none() {
-            lines.push(format!("No error falls significantly on {held_out}: no gain is claimed."));
-        }
-        for e in claimed {
-            lines.push(format!(
-                "  {} on {held_out}: error {:.3} to {:.3} ({}), {:.0} % less ({:.0} to {:.0} %)",
-                e.title,
-                e.before,
-                e.after,
-                e.quantity,
-                100.0 * e.fall_frac,
-                100.0 * e.fall_frac_interval[0],
-                100.0 * e.fall_frac_interval[1],
-            ));
-        }
-    }
-    for n in &extension.not_carried {
-        lines.push(format!("Not in the extended truck: {} ({})", n.id, n.why));
-    }
-    if !found.tolerances_from_baseline {
-        lines.push("Without a baseline the tolerances are defaults.".to_owned());
-    }
-    lines.push(format!("Report: {}", out.join("report.html").display()));
-    lines.join("\n")
-}
-
-/// The verdict as a sentence.
-fn verdict(found: &Diagnosis) -> String {
-    match found.verdict {
-        Verdict::Explained => "The simulation is wrong, and this is why:",
-        Verdict::NothingToExplain => "The drives fit the truck file; there is nothing to explain.",
-        Verdict::Unknown => "The simulation is wrong, and no cause of the catalogue explains it.",
-        Verdict::Ambiguous => "The simulation is wrong; these drives leave more than one cause:",
-    }
-    .to_owned()
 }

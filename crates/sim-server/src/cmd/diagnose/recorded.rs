@@ -1,7 +1,8 @@
 //! Our own recordings as measured drives: `run.mcap` to a folder of drives.
 //!
-//! A recording holds the true state of the simulated truck, without noise and delays. GPS speed,
-//! accelerometer, coolant and the road's curvature are not in it.
+//! A recording holds the true state of the simulated truck; the drive holds what a logger would
+//! make of it (see [`super::logger`]). GPS speed, accelerometer, coolant and the road's curvature are
+//! not in a recording.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,6 +14,7 @@ use mcap::records::{Record, op};
 use sim::Scenario;
 
 use super::folder::{STEP_S, Table};
+use super::logger::{Draw, as_logged};
 use crate::failure::Failure;
 use crate::recording::Layout;
 use crate::recording::recover::{Records, attachment_is_whole};
@@ -90,7 +92,7 @@ const COLUMNS: [&str; 20] = [
 ///
 /// # Errors
 /// [`Failure::Input`] if it is no recording of this program, or holds no state.
-pub(super) fn table(path: &Path, truck: &TruckParameters) -> Result<Table, Failure> {
+pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<Table, Failure> {
     let input = File::open(path).map_err(|e| Failure::file(path, e))?;
     let bytes = input.metadata().map_err(|e| Failure::file(path, e))?.len();
     let mut records = Records::new(BufReader::new(input), bytes);
@@ -106,6 +108,7 @@ pub(super) fn table(path: &Path, truck: &TruckParameters) -> Result<Table, Failu
         last_s: f64::NEG_INFINITY,
         start_z_m: None,
         climbed_m: Vec::new(),
+        draw: Draw::of_seed(seed),
     };
     while let Some((code, body)) = records.next_record().map_err(|e| Failure::file(path, e))? {
         let damaged = code == op::ATTACHMENT && !attachment_is_whole(&body);
@@ -144,6 +147,7 @@ struct Reader {
     last_s: f64,
     start_z_m: Option<f64>,
     climbed_m: Vec<f64>,
+    draw: Draw,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -221,7 +225,7 @@ impl Reader {
         ] = state;
         self.last_s = time_s;
         self.climbed_m.push(z - *self.start_z_m.get_or_insert(z));
-        self.table.push(&[
+        let mut row = [
             time_s,
             s,
             speed,
@@ -241,6 +245,8 @@ impl Reader {
             accel_y,
             fuel,
             grade.tan(),
-        ]);
+        ];
+        as_logged(&COLUMNS, &mut row, &mut self.draw);
+        self.table.push(&row);
     }
 }

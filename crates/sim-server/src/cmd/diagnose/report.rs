@@ -12,13 +12,15 @@ use crate::picture::plotly_js;
 const DIGITS: i32 = 5;
 
 /// The page. `diagnosis_json` is what `diagnosis.json` holds, `drives` names where the drives came
-/// from, `overlay` is the text of the extended truck file.
+/// from, `overlay` is the text of the extended truck file, `example` what was hidden and the trip that
+/// closes the loop.
 pub(super) fn page(
     found: &Diagnosis,
     diagnosis_json: &Value,
     report: &Report,
     drives: &str,
     overlay: Option<&str>,
+    example: Option<Value>,
 ) -> String {
     let advice: BTreeMap<&str, &str> = found.causes.iter().map(|c| (c.id, advice(c.id))).collect();
     let figures = serde_json::to_value(report).map_or(Value::Null, rounded);
@@ -28,6 +30,7 @@ pub(super) fn page(
         "advice": advice,
         "drives": drives,
         "overlay": overlay,
+        "example": example.map_or(Value::Null, rounded),
     });
     // the data last: what users named may look like a placeholder
     include_str!("page/page.html")

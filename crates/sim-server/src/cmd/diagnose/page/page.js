@@ -144,6 +144,17 @@ function gain() {
       `${percent(g.fall_frac)} (${percent(g.fall_frac_interval[0])} to ${percent(g.fall_frac_interval[1])})`, g.claimed ? node("span", "yes", "yes") : "no"]));
 }
 
+function loop() {
+  const e = DATA.example;
+  if (!e) { clear("loop"); return; }
+  const size = e.hidden.unit === "1" ? `${e.hidden.size > 0 ? "+" : ""}${(100 * e.hidden.size).toFixed(1)} %` : `${fixed(e.hidden.size)} ${e.hidden.unit}`;
+  byId("loop-text").textContent = `Hidden in the measured truck was ${words(e.hidden.id)}, ${size}: ${e.hidden.meaning}. ${e.sentence}.`;
+  const trips = [["true truck", e.loop.true_truck, MEASURED, 2.6], ["truck file", e.loop.truck_file, BEFORE, 1.6], ["extended truck", e.loop.extended_truck, AFTER, 1.6]];
+  Plotly.newPlot("loop-plot", trips.map(([name, t, color, width]) => ({ type: "scattergl", mode: "lines", name: `${name}: ${fixed(t.fuel_g / 1000, 4)} kg fuel, ${t.trip_time_s.toFixed(0)} s`,
+    x: t.s_m.map((s) => s / 1000), y: t.speed_m_s.map((v) => 3.6 * v), line: { color, width } })),
+  { ...base, margin: { ...base.margin, t: 40 }, hovermode: "x unified", xaxis: axis("distance, km"), yaxis: axis("speed, km/h") }, plain);
+}
+
 function wrong() {
   if (!D.wrong.length) { byId("wrong-table").append(node("p", "Nothing beyond the noise.")); return; }
   table("wrong-table", [{ name: "Quantity" }, { name: "Free run", number: true }, { name: "rms error", number: true }, { name: "Bias", number: true }, { name: "Drives in order", number: true }, { name: "Accuracy", number: true }, { name: "Where" }],
@@ -195,4 +206,4 @@ function rest() {
   byId("footer").textContent = `Tractrix ${D.version}, revision ${D.git_revision.slice(0, 12)}, seed ${D.seed}. Tolerances ${D.tolerances_from_baseline ? "learned from baseline drives" : "are defaults: no baseline was given"}.`;
 }
 
-heading(); why(); overlay(); gain(); wrong(); maps(); rest();
+heading(); why(); overlay(); gain(); loop(); wrong(); maps(); rest();
