@@ -206,6 +206,10 @@ const AMBIGUOUS_NATS: f64 = 3.0;
 /// Evidence that a free function needs beside or instead of named causes, nats.
 const UNKNOWN_EVIDENCE: f64 = 20.0;
 
+/// Part of the causes' evidence that a free function may add before the causes are not sure: a
+/// substitute for a cause that the catalogue lacks leaves more.
+const LEFT_OVER: f64 = 0.08;
+
 /// Finds what the simulation of `plant` gets wrong on `drives` and names the cause.
 ///
 /// `baseline` are drives of the same truck and logger that are in order.
@@ -247,13 +251,13 @@ pub fn diagnose(
     };
     let fit = problem.gate(fit, &empty, &open);
     progress(Progress::Unknown);
-    let (fit, shape, unexplained) = outside(&problem, &empty, fit);
+    let (fit, shape, sure) = outside(&problem, &empty, fit);
     let causes = causes(&problem, &fit, &empty, &open);
-    let verdict = if unexplained {
+    let verdict = if sure == Sure::Outside {
         Verdict::Unknown
     } else if fit.set.is_empty() {
         Verdict::NothingToExplain
-    } else if causes.first().is_some_and(|c| c.1) {
+    } else if sure == Sure::Not || causes.first().is_some_and(|c| c.1) {
         Verdict::Ambiguous
     } else {
         Verdict::Explained
@@ -341,7 +345,7 @@ fn observable(problem: &Problem<'_>, options: &Options) -> (Vec<usize>, Vec<NotO
 }
 
 /// Decides between named causes and a free function of a signal.
-fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, bool) {
+fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, Sure) {
     let drives = problem.drives.len() as f64;
     let beyond = |shapes: Vec<Shape>| -> Vec<Shape> {
         let mut out: Vec<Shape> = shapes
@@ -373,14 +377,45 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
     };
     let best_bare = bare.first().map_or(0.0, |s| s.log_z);
     if best_bare > UNKNOWN_EVIDENCE && best_bare > 1.15 * fit.log_z {
-        return (empty.clone(), describe(&bare), true);
+        return (empty.clone(), describe(&bare), Sure::Outside);
     }
     let left = rest.first().map_or(0.0, |s| s.log_z);
-    if left > UNKNOWN_EVIDENCE.max(0.08 * fit.log_z) {
-        let nothing_named = fit.set.is_empty();
-        return (fit, describe(&rest), nothing_named);
+    if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
+        let sure = if fit.set.is_empty() { Sure::Outside } else { Sure::Not };
+        return (fit, describe(&rest), sure);
     }
-    (fit, None, false)
+    if let Some((module, excess, evidence)) = problem.restless(&fit.theta) {
+        let other = if module == Module::Yaw { Module::TrailerYaw } else { Module::Yaw };
+        let lateral = matches!(module, Module::Yaw | Module::TrailerYaw);
+        let unknown = Unknown {
+            signals: if lateral {
+                vec![module.quantity(), other.quantity()]
+            } else {
+                vec![module.quantity()]
+            },
+            quantity: module.quantity(),
+            shape: sentence::restless(module, excess),
+            explained_frac: 0.0,
+            evidence,
+            table: Vec::new(),
+        };
+        if fit.set.is_empty() || evidence > fit.log_z {
+            return (empty.clone(), Some(unknown), Sure::Outside);
+        }
+        return (fit, Some(unknown), Sure::Yes);
+    }
+    (fit, None, Sure::Yes)
+}
+
+/// How sure a set of named causes is against what the catalogue does not have.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Sure {
+    /// The causes explain what there is.
+    Yes,
+    /// Much is left that follows a signal: the causes may stand in for something else.
+    Not,
+    /// A free function explains more than any cause.
+    Outside,
 }
 
 fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<(Cause, bool)> {

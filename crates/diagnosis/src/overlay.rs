@@ -60,6 +60,8 @@ enum Carry {
     Retarder,
     /// Force per brake demand.
     BrakeDemand,
+    /// The simulator does it without being told.
+    Implied,
     /// Nothing carries it.
     Nowhere(&'static str),
 }
@@ -82,6 +84,8 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("fan_load", "coolant_start_offset_k") => {
             From("engine.fan_on_k", ZERO_DEGC_K + FAN_FROM_DEGC, 1.0)
         }
+        ("fan_load", "hysteresis_k") => Plus("engine.fan_hysteresis_k", 1.0),
+        ("payload_position", "stiffness_follows_load") => Carry::Implied,
         ("dragging_brake", "force_n") => Plus("resistance.parasitic_force_n", 1.0),
         ("engine_friction", "friction_scale") => Times("engine.friction_scale_coeff"),
         ("altitude_derate", "torque_loss_per_km") => Plus("engine.derate_altitude_1_m", 1e-3),
@@ -180,7 +184,7 @@ impl Carry {
                 let path = "brake.gain_scale_coeff";
                 one(path, now(path) * (1.0 + value * per_mass), now(path) * sigma * per_mass)
             }
-            Self::Nowhere(_) => Vec::new(),
+            Self::Implied | Self::Nowhere(_) => Vec::new(),
         }
     }
 }

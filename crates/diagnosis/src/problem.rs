@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::param::{P, PARAMS, SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Prepared, Residuals, affects, replay_group};
 use crate::stats::whiten::Whitener;
+use crate::unknown::KNOTS;
 use crate::{DiagnosisError, Executor, Plant};
 
 /// Tolerances, calibration and noise of a truck and its logger.
@@ -24,6 +25,8 @@ pub(crate) struct Reference {
     pub(crate) whiteners: Vec<Whitener>,
     /// Mean square of whitened residuals at the calibration, tolerances included, per module.
     pub(crate) ratio: [f64; MODULES],
+    /// The same with the tolerances taken out.
+    pub(crate) settled: [f64; MODULES],
     /// Evidence of the best free function per module on drives that are in order, nats per drive.
     pub(crate) free_form: [f64; MODULES],
 }
@@ -38,6 +41,8 @@ type Replayed = std::sync::Mutex<HashMap<Vec<u64>, Arc<Column>>>;
 /// Drives' worth of the expected scatter that the baseline has to outweigh, and rounds of the
 /// iteration.
 const SCATTER_PRIOR: f64 = 2.0;
+/// Spread of a tolerance's mean, in its scatter.
+const MEAN_PRIOR: f64 = 0.7;
 const SCATTER_ROUNDS: usize = 25;
 
 /// Most sensitivities kept per drive.
@@ -49,6 +54,13 @@ struct Nuisance {
     whitened: Column,
     columns: Vec<Column>,
     factor: nalgebra::Cholesky<f64, nalgebra::Dyn>,
+}
+
+/// What is left of a drive: whitened, its squared length, its product with the tolerances.
+pub(crate) struct Rest {
+    pub(crate) whitened: Column,
+    norm: f64,
+    tolerances: DVector<f64>,
 }
 
 /// A set of drives ready for the search.
@@ -110,7 +122,14 @@ impl Reference {
             *t = s.scatter();
         }
         let whiteners = fit_whiteners(drives, residuals, true);
-        Self { theta, tolerance, whiteners, ratio: [1.0; MODULES], free_form: [0.0; MODULES] }
+        Self {
+            theta,
+            tolerance,
+            whiteners,
+            ratio: [1.0; MODULES],
+            settled: [1.0; MODULES],
+            free_form: [0.0; MODULES],
+        }
     }
 }
 
@@ -187,6 +206,7 @@ impl<'a> Problem<'a> {
         }
         if clean {
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
+            problem.reference.settled = problem.settled(&problem.reference.theta);
             let count = problem.drives.len() as f64;
             for s in problem.shapes(&problem.reference.theta) {
                 let f = &mut problem.reference.free_form[s.module as usize];
@@ -206,6 +226,28 @@ impl<'a> Problem<'a> {
             }
         }
         sums.map(|(s, n)| if n > 0.0 && s > 0.0 { s / n } else { 1.0 })
+    }
+
+    /// The same after what the tolerances of each drive can take is taken out.
+    pub(crate) fn settled(&self, theta: &Theta) -> [f64; MODULES] {
+        let parts = self.each(|i| {
+            let rest = self.rest(i, theta);
+            let nuisance = &self.nuisance[i];
+            let z = nuisance.factor.solve(&rest.tolerances);
+            let mut left = rest.whitened;
+            for (c, z) in nuisance.columns.iter().zip(z.iter()) {
+                for (left, c) in left.iter_mut().zip(c) {
+                    left.iter_mut().zip(c).for_each(|(x, c)| *x -= z * c);
+                }
+            }
+            left.map(|x| inner(&x, &x))
+        });
+        core::array::from_fn(|m| {
+            let rows: usize =
+                self.drives.iter().map(|d| d.valid[m].iter().filter(|x| **x).count()).sum();
+            let sum: f64 = parts.iter().map(|p| p[m]).sum();
+            if rows > 0 && sum > 0.0 { sum / rows as f64 } else { 1.0 }
+        })
     }
 
     /// A problem on other drives with a reference learned before.
@@ -399,6 +441,82 @@ impl<'a> Problem<'a> {
         g
     }
 
+    /// What is left of drive `i` at `theta`.
+    pub(crate) fn rest(&self, i: usize, theta: &Theta) -> Rest {
+        let whitened = self.at(i, theta).1;
+        let columns = &self.nuisance[i].columns;
+        Rest {
+            tolerances: DVector::from_iterator(
+                columns.len(),
+                columns.iter().map(|c| dot(c, &whitened)),
+            ),
+            norm: dot(&whitened, &whitened),
+            whitened,
+        }
+    }
+
+    /// Marginal Gram matrix over the residual and hat functions of one module: `places` gives the
+    /// knot to the left and the way to the next, per row. Only a few hats touch a row, so the
+    /// whitened hats are never written out.
+    pub(crate) fn hats(
+        &self,
+        i: usize,
+        m: usize,
+        places: &[Option<(usize, f64)>],
+        rest: &Rest,
+    ) -> DMatrix<f64> {
+        let (d, nuisance) = (&self.drives[i], &self.nuisance[i]);
+        let whitener = &self.reference.whiteners[m];
+        let scale = 1.0 / whitener.sigma;
+        let touched: Vec<(usize, &[f64])> = nuisance
+            .columns
+            .iter()
+            .enumerate()
+            .filter(|(_, c)| !c[m].is_empty())
+            .map(|(j, c)| (j, c[m].as_slice()))
+            .collect();
+        let mut g = DMatrix::zeros(KNOTS + 1, KNOTS + 1);
+        let mut z = DMatrix::zeros(nuisance.columns.len(), KNOTS + 1);
+        g[(0, 0)] = rest.norm;
+        z.set_column(0, &rest.tolerances);
+        let residual = &rest.whitened[m];
+        for k in 0..residual.len().min(places.len()) {
+            if !d.valid[m][k] {
+                continue;
+            }
+            let (mut hat, mut low, mut high) = ([0.0; KNOTS], KNOTS, 0);
+            let mut add = |place: Option<(usize, f64)>, weight: f64| {
+                if let Some((j, w)) = place {
+                    hat[j] += weight * (1.0 - w);
+                    hat[j + 1] += weight * w;
+                    (low, high) = (low.min(j), high.max(j + 1));
+                }
+            };
+            add(places[k], scale);
+            for (lag, a) in whitener.coefficients.iter().enumerate().take(k) {
+                add(places[k - 1 - lag], -a * scale);
+            }
+            for a in low..=high {
+                g[(0, a + 1)] += residual[k] * hat[a];
+                for b in a..=high {
+                    g[(a + 1, b + 1)] += hat[a] * hat[b];
+                }
+                for (j, c) in &touched {
+                    z[(*j, a + 1)] += c[k] * hat[a];
+                }
+            }
+        }
+        for a in 0..=KNOTS {
+            for b in 0..a {
+                g[(a, b)] = g[(b, a)];
+            }
+        }
+        if let Some(y) = nuisance.factor.l().solve_lower_triangular(&z) {
+            g -= y.transpose() * y;
+        }
+        g
+    }
+
     /// Whitened residuals of drive `i` at `theta`.
     pub(crate) fn whitened(&self, i: usize, theta: &Theta) -> Column {
         self.at(i, theta).1
@@ -412,8 +530,10 @@ impl<'a> Problem<'a> {
         n.factor.solve(&zr).iter().copied().collect()
     }
 
-    /// Scatter of every tolerance between the drives by expectation-maximisation: the mean square
-    /// of what each drive says of it, with [`SCATTER_PRIOR`] drives' worth of what is expected.
+    /// Mean and scatter of every tolerance between the drives by expectation-maximisation, with
+    /// [`SCATTER_PRIOR`] drives' worth of the scatter that is expected and a prior for the mean. The
+    /// mean is what this truck and its weather are like when all is well (a crosswind of any sign
+    /// adds drag): causes count from there.
     fn scatter(&mut self) {
         let specs: Vec<&crate::param::Spec> =
             nuisance_directions(&self.reference.tolerance).iter().map(|d| d.p.spec()).collect();
@@ -429,20 +549,28 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let count = self.drives.len() as f64;
-        // Variances in units of those that the columns are scaled with.
+        // Means and variances in units of what the columns are scaled with.
         let mut variance = vec![1.0; specs.len()];
+        let mut mean = DVector::<f64>::zeros(specs.len());
         for _ in 0..SCATTER_ROUNDS {
+            let mut first = DVector::<f64>::zeros(specs.len());
             let mut second = vec![0.0; specs.len()];
             for (a, b) in &systems {
-                let mut a = a.clone();
+                let (mut a, mut b) = (a.clone(), b.clone());
                 for (j, v) in variance.iter().enumerate() {
                     a[(j, j)] += 1.0 / v;
+                    b[j] += mean[j] / v;
                 }
                 let Some(factor) = a.cholesky() else { return };
-                let (z, spread) = (factor.solve(b), factor.inverse());
+                let (z, spread) = (factor.solve(&b), factor.inverse());
                 for (j, s) in second.iter_mut().enumerate() {
-                    *s += z[j] * z[j] + spread[(j, j)];
+                    *s += (z[j] - mean[j]).powi(2) + spread[(j, j)];
                 }
+                first += z;
+            }
+            for (j, (v, s)) in variance.iter().zip(&specs).enumerate() {
+                let own = MEAN_PRIOR * s.scatter() / self.reference.tolerance[s.p as usize];
+                mean[j] = first[j] / (count + v / (own * own));
             }
             for ((v, second), s) in variance.iter_mut().zip(second).zip(&specs) {
                 let expected = (s.scatter() / self.reference.tolerance[s.p as usize]).powi(2);
@@ -454,8 +582,12 @@ impl<'a> Problem<'a> {
                     .min(bound * bound * expected);
             }
         }
-        for (v, s) in variance.iter().zip(&specs) {
-            self.reference.tolerance[s.p as usize] *= v.sqrt();
+        for (j, (v, s)) in variance.iter().zip(&specs).enumerate() {
+            let i = s.p as usize;
+            let shift = mean[j] * self.reference.tolerance[i];
+            let x = &mut self.reference.theta[i];
+            *x = (*x + shift).clamp(s.lo, s.hi);
+            self.reference.tolerance[i] *= v.sqrt();
         }
     }
 
@@ -469,6 +601,36 @@ impl<'a> Problem<'a> {
                 .clamp(s.p.spec().lo, s.p.spec().hi);
         }
         replay(d, self.plant, &t)
+    }
+
+    /// One parameter after the other, in halving steps: delays of sampled signals have a kink at
+    /// every sample, where Gauss-Newton stops short.
+    fn creep(
+        &self,
+        theta: &mut Theta,
+        best: &mut f64,
+        free: &[&crate::param::Spec],
+        cost: &dyn Fn(f64, &Theta) -> f64,
+    ) {
+        for s in free.iter().filter(|s| s.unit == "s") {
+            let mut step = 0.02;
+            while step > 0.004 {
+                let mut moved = false;
+                for sign in [1.0, -1.0] {
+                    let mut t = *theta;
+                    let x = &mut t[s.p as usize];
+                    *x = (*x + sign * step).clamp(s.lo, s.hi);
+                    let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
+                    if c < *best {
+                        (*theta, *best, moved) = (t, c, true);
+                        break;
+                    }
+                }
+                if !moved {
+                    step *= 0.5;
+                }
+            }
+        }
     }
 
     /// Gauss-Newton steps of the common calibration.
@@ -517,6 +679,7 @@ impl<'a> Problem<'a> {
                 break;
             }
         }
+        self.creep(&mut theta, &mut best, &free, &cost);
         self.reference.theta = theta;
         self.refresh()
     }

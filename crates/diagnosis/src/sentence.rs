@@ -131,6 +131,16 @@ pub(crate) fn not_excited(id: &str) -> &'static str {
     }
 }
 
+/// A disturbance that follows no signal, in words.
+pub(crate) fn restless(module: crate::replay::Module, excess: f64) -> String {
+    format!(
+        "a random disturbance of {} that follows no measured signal: {:.1} times the variance of \
+         drives in order (gusts, a rough road or a noisy sensor)",
+        module.quantity(),
+        excess
+    )
+}
+
 /// A free function in words.
 pub(crate) fn shape(s: &Shape) -> String {
     let extreme = s

@@ -5,12 +5,12 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::drive::Drive;
 use crate::param::Theta;
-use crate::problem::{Column, Problem};
+use crate::problem::{Problem, Rest};
 use crate::replay::{Module, Prepared};
 use crate::stats::evidence;
 
 /// Knots of the spline.
-const KNOTS: usize = 9;
+pub(crate) const KNOTS: usize = 9;
 /// Correlation length over the signal's range.
 const LENGTH: f64 = 0.3;
 
@@ -60,6 +60,8 @@ const SEARCHED: &[(Module, f64)] = &[
     (Module::TrailerYaw, 0.003),
     (Module::AccelY, 0.1),
     (Module::Gps, 0.1),
+    (Module::Shift, 0.2),
+    (Module::Imu, 0.05),
 ];
 
 /// Signals that the module itself writes, which its own noise would imitate.
@@ -67,15 +69,44 @@ fn own(module: Module, signal: &str) -> bool {
     module.quantity() == signal && module != Module::Force
 }
 
+/// Excess of the whitened variance over drives in order that no tolerance explains.
+const RESTLESS: f64 = 1.1;
+
 impl Problem<'_> {
+    /// A disturbance that follows no measured signal: more variance than drives in order have, in
+    /// tractor and trailer yaw alike (gusts), or far more in one module. The module that shows it
+    /// most, its excess and the evidence, nats.
+    pub(crate) fn restless(&self, theta: &Theta) -> Option<(Module, f64, f64)> {
+        let now = self.settled(theta);
+        let excess = |m: Module| now[m as usize] / self.reference.settled[m as usize].max(1.0);
+        let rows = |m: Module| -> f64 {
+            let count = |d: &Prepared| d.valid[m as usize].iter().filter(|x| **x).count() as f64;
+            self.drives.iter().map(count).sum()
+        };
+        let gusts = excess(Module::Yaw) > RESTLESS && excess(Module::TrailerYaw) > RESTLESS;
+        Module::ALL
+            .into_iter()
+            .filter(|m| {
+                let own = excess(*m);
+                SEARCHED.iter().any(|s| s.0 == *m)
+                    && (own > 2.0
+                        || gusts && *m == Module::Yaw
+                        || gusts && *m == Module::TrailerYaw)
+            })
+            .map(|m| {
+                let e = excess(m);
+                (m, e, 0.5 * rows(m) * (e - 1.0 - e.ln()))
+            })
+            .max_by(|a, b| a.2.total_cmp(&b.2))
+    }
+
     /// The best free-form functions at `theta`, one per module and signal, best first.
     pub(crate) fn shapes(&self, theta: &Theta) -> Vec<Shape> {
-        let residuals: Vec<Column> =
-            (0..self.drives.len()).map(|i| self.whitened(i, theta)).collect();
+        let residuals: Vec<Rest> = (0..self.drives.len()).map(|i| self.rest(i, theta)).collect();
         let mut out = Vec::new();
         for (module, size) in SEARCHED {
             let m = *module as usize;
-            let rows: f64 = residuals.iter().map(|r| r[m].len() as f64).sum();
+            let rows: f64 = residuals.iter().map(|r| r.whitened[m].len() as f64).sum();
             if !self.drives.iter().any(|d| d.available[m]) || rows < 100.0 {
                 continue;
             }
@@ -98,7 +129,7 @@ impl Problem<'_> {
         size: f64,
         signal: &'static str,
         read: Read,
-        residuals: &[Column],
+        residuals: &[Rest],
     ) -> Option<Shape> {
         let m = module as usize;
         let step = module.row_step();
@@ -123,22 +154,16 @@ impl Problem<'_> {
         }
         let mut total = DMatrix::zeros(KNOTS + 1, KNOTS + 1);
         for (i, d) in self.drives.iter().enumerate() {
-            let mut hats = vec![vec![0.0; d.valid[m].len()]; KNOTS];
-            for (k, ok) in d.valid[m].iter().enumerate() {
-                if *ok {
+            let places: Vec<Option<(usize, f64)>> = d.valid[m]
+                .iter()
+                .enumerate()
+                .map(|(k, ok)| {
                     let x = ((value(d, k) - lo) / width).clamp(0.0, (KNOTS - 1) as f64);
                     let j = (x as usize).min(KNOTS - 2);
-                    hats[j][k] = 1.0 - (x - j as f64);
-                    hats[j + 1][k] = x - j as f64;
-                }
-            }
-            let mut columns = vec![residuals[i].clone()];
-            for h in &hats {
-                let mut c: Column = Default::default();
-                c[m] = self.reference.whiteners[m].apply(h, &d.valid[m]);
-                columns.push(c);
-            }
-            total += self.marginal(i, &columns);
+                    ok.then_some((j, x - j as f64))
+                })
+                .collect();
+            total += self.hats(i, m, &places, &residuals[i]);
         }
         let kernel = DMatrix::from_fn(KNOTS, KNOTS, |i, j| {
             let x = (i as f64 - j as f64) / (KNOTS - 1) as f64 / LENGTH;
@@ -153,7 +178,7 @@ impl Problem<'_> {
         let taken = 2.0 * b.dot(&w) - (&a * &w).dot(&w);
         let rows: f64 =
             self.drives.iter().map(|d| d.valid[m].iter().filter(|x| **x).count() as f64).sum();
-        let chi: f64 = residuals.iter().flat_map(|r| &r[m]).map(|x| x * x).sum();
+        let chi: f64 = residuals.iter().flat_map(|r| &r.whitened[m]).map(|x| x * x).sum();
         let excess = (chi - rows).max(taken).max(1.0);
         Some(Shape {
             module,

@@ -140,6 +140,7 @@ impl TruckModel {
             },
             tyre_warmth: 0.0,
             coolant_k: 355.0,
+            fan_runs: false,
             fuel_g: 0.0,
             fuel_rate_g_s: 0.0,
             forces: Forces::default(),
@@ -300,7 +301,7 @@ impl TruckModel {
         let (e, p) = (&self.engine, &self.parameters.engine);
         let n = s.engine_speed_rad_s;
         let friction = e.friction_nm(n);
-        let holding = friction + e.auxiliary_nm(n, s.coolant_k);
+        let holding = friction + e.auxiliary_nm(n, s.fan_runs);
         let governor = ((e.max_rad_s * 1.02 - n) / (e.max_rad_s * 0.04)).clamp(0.0, 1.0);
         let mut demand =
             e.pedal_demand_nm(pedal, n, full_load_nm).min(full_load_nm + friction) * governor;
@@ -341,7 +342,7 @@ impl TruckModel {
         let n = s.engine_speed_rad_s;
         let crank_nm = s.engine_torque_nm
             - self.engine.friction_nm(n)
-            - self.engine.auxiliary_nm(n, s.coolant_k)
+            - self.engine.auxiliary_nm(n, s.fan_runs)
             - s.engine_brake_nm;
         let geared = d.engine_speed_rad_s(s.speed_m_s, gear);
         let open = s.shift.phase == ShiftPhase::Open || gear == 0;
@@ -496,7 +497,8 @@ impl TruckModel {
         let rolling = if s.speed_m_s.abs() > 1.0 { 1.0 } else { 0.0 };
         s.tyre_warmth += (rolling - s.tyre_warmth) * SUBSTEP_S / r.tyre_warmup_s;
         let power = s.engine_torque_nm * s.engine_speed_rad_s;
-        let fan = if s.coolant_k > self.parameters.engine.fan_on_k { 12.0 } else { 0.0 };
+        s.fan_runs = self.engine.fan_runs(s.fan_runs, s.coolant_k);
+        let fan = if s.fan_runs { 12.0 } else { 0.0 };
         let level = patch.air_temperature_k + COOLANT.2 + COOLANT.1 * power - fan;
         s.coolant_k += (level.max(350.0) - s.coolant_k) * SUBSTEP_S / COOLANT.0;
     }

@@ -166,7 +166,7 @@ impl TruckModel {
             })
         };
         let idle = self.engine.idle_rad_s;
-        let holding = self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, 350.0);
+        let holding = self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, false);
         Ok(VehicleLimits {
             geometry: self.geometry(),
             powertrain: PowertrainLimits {

@@ -106,6 +106,8 @@ pub struct TruckState {
     pub tyre_warmth: f64,
     /// Coolant temperature, K.
     pub coolant_k: f64,
+    /// The cooling fan runs.
+    pub fan_runs: bool,
     /// Fuel used, g.
     pub fuel_g: f64,
     /// Fuel flow, g/s.

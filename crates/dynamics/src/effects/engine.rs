@@ -70,6 +70,9 @@ pub struct EngineParameters {
     /// Coolant temperature above which the fan runs, K.
     #[serde(default = "fan_on_k")]
     pub fan_on_k: f64,
+    /// How far the coolant must fall below that for the fan to stop, K.
+    #[serde(default)]
+    pub fan_hysteresis_k: f64,
     /// Altitude above which full load falls, m.
     #[serde(default = "derate_altitude_m")]
     pub derate_altitude_m: f64,
@@ -162,6 +165,7 @@ impl EngineParameters {
         b.within("auxiliary_power_w", self.auxiliary_power_w, 0.0, 60_000.0);
         b.within("fan_power_w", self.fan_power_w, 0.0, 80_000.0);
         b.within("fan_on_k", self.fan_on_k, 280.0, 450.0);
+        b.within("fan_hysteresis_k", self.fan_hysteresis_k, 0.0, 30.0);
         b.within("derate_altitude_m", self.derate_altitude_m, -500.0, 6_000.0);
         b.within("derate_altitude_1_m", self.derate_altitude_1_m, 0.0, 1e-3);
         b.within("derate_air_k", self.derate_air_k, 250.0, 350.0);
@@ -260,11 +264,18 @@ impl Engine {
         if boosting { p.slow_lag_s } else { p.fast_lag_s }
     }
 
+    /// Whether the fan runs at a coolant temperature, given whether it ran before.
+    #[must_use]
+    pub fn fan_runs(&self, ran: bool, coolant_k: f64) -> bool {
+        let p = &self.parameters;
+        coolant_k > if ran { p.fan_on_k - p.fan_hysteresis_k } else { p.fan_on_k }
+    }
+
     /// Torque that the auxiliaries take from the crank, Nm.
     #[must_use]
-    pub fn auxiliary_nm(&self, speed_rad_s: f64, coolant_k: f64) -> f64 {
+    pub fn auxiliary_nm(&self, speed_rad_s: f64, fan_runs: bool) -> f64 {
         let p = &self.parameters;
-        let fan_w = if coolant_k > p.fan_on_k { p.fan_power_w } else { 0.0 };
+        let fan_w = if fan_runs { p.fan_power_w } else { 0.0 };
         (p.auxiliary_power_w + fan_w) / speed_rad_s.max(0.5 * self.idle_rad_s)
     }
 
