@@ -127,8 +127,7 @@ fn line(d: &Diagnosis) -> String {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let usage =
-        "usage: campaign KIND COUNT SEED [drives=N] [without=channel,...] [only=cause] [dump=DIR]";
+    let usage = "usage: campaign KIND COUNT SEED [drives=N] [without=channel,...] [only=cause] [from=CASE] [dump=DIR]";
     let kind = arguments.first().ok_or(usage)?.as_str();
     let count: usize = arguments.get(1).ok_or(usage)?.parse()?;
     let seed: u64 = arguments.get(2).ok_or(usage)?.parse()?;
@@ -170,6 +169,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
             _ => return Err(usage.into()),
         };
+        if option("from=").is_some_and(|n| n.parse::<usize>().is_ok_and(|n| case < n)) {
+            continue;
+        }
         let case_seed = seed.wrapping_mul(1_000_003) + case as u64;
         let mut set = generate(&base, &hidden, &campaign, case_seed)?;
         if let Some(without) = option("without=") {

@@ -225,6 +225,8 @@ pub fn diagnose(
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Diagnosis, DiagnosisError> {
     let (learn, held) = split(drives, &options.hold_out)?;
+    crate::plausible::check_length(drives)?;
+    baseline.map_or(Ok(()), crate::plausible::check_length)?;
     crate::plausible::check_truck(plant, drives)?;
     let prepare = |names: &[usize]| -> Vec<Prepared> {
         names.iter().map(|i| Prepared::new(&drives.drives[*i], plant)).collect()

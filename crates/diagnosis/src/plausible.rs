@@ -5,6 +5,34 @@ use crate::{Channel as C, DiagnosisError, DriveSet, Plant};
 /// Deviation of the overall ratio that no tyre wear or slip explains.
 const MAX_DEVIATION: f64 = 0.08;
 
+/// Shortest drive that can be judged, s: a rollout, and the rest of the filters' memory.
+const MIN_DURATION_S: f64 = 90.0;
+
+/// Refuses drives that are too short, or that hold values which are no numbers.
+pub(crate) fn check_length(set: &DriveSet) -> Result<(), DiagnosisError> {
+    for d in &set.drives {
+        if d.duration_s() < MIN_DURATION_S {
+            return Err(DiagnosisError::NoDrives {
+                what: format!(
+                    "{} has {} samples ({:.1} s); {MIN_DURATION_S} s are needed",
+                    d.name,
+                    d.len,
+                    d.duration_s()
+                ),
+            });
+        }
+        for c in C::all() {
+            let bad = d.get(c).and_then(|x| x.iter().position(|x| !x.is_finite()));
+            if let Some(at) = bad {
+                return Err(DiagnosisError::NoDrives {
+                    what: format!("{}: {} is not a number at sample {at}", d.name, c.name()),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
 pub(crate) fn check_truck(plant: &Plant, set: &DriveSet) -> Result<(), DiagnosisError> {
     let gears = plant.gear_ratios.len();
     let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); gears + 1];

@@ -52,6 +52,8 @@ struct Nuisance {
     /// Residuals at the reference, and whitened.
     base: Residuals,
     whitened: Column,
+    /// Sensitivities before whitening, per unit of the parameter.
+    raw: Vec<Arc<Column>>,
     columns: Vec<Column>,
     factor: nalgebra::Cholesky<f64, nalgebra::Dyn>,
 }
@@ -188,13 +190,13 @@ impl<'a> Problem<'a> {
         let mut problem =
             Self { plant, drives, reference, nuisance: Vec::new(), replayed, executor };
         problem.refresh()?;
-        for round in 0..3 {
+        for round in 0..2 {
             if clean || round > 0 {
-                problem.calibrate(clean)?;
+                problem.calibrate(clean, round == 0)?;
             }
             if clean && round > 0 {
                 problem.scatter();
-                problem.refresh()?;
+                problem.follow()?;
             }
             let mut noise = Vec::with_capacity(problem.drives.len());
             for i in 0..problem.drives.len() {
@@ -202,7 +204,11 @@ impl<'a> Problem<'a> {
                 noise.push(problem.without_nuisance(i, &z));
             }
             problem.reference.whiteners = fit_whiteners(&problem.drives, &noise, false);
-            problem.refresh()?;
+            problem.follow()?;
+        }
+        if clean {
+            problem.scatter();
+            problem.follow()?;
         }
         if clean {
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
@@ -276,15 +282,31 @@ impl<'a> Problem<'a> {
         slots.into_iter().filter_map(|s| s.into_inner().ok().flatten()).collect()
     }
 
+    /// Residuals and sensitivities to the tolerances at the reference.
     fn refresh(&mut self) -> Result<(), DiagnosisError> {
+        self.rebuild(false)
+    }
+
+    /// The same after a small change of the reference: the sensitivities themselves stay.
+    fn follow(&mut self) -> Result<(), DiagnosisError> {
+        self.rebuild(true)
+    }
+
+    fn rebuild(&mut self, keep: bool) -> Result<(), DiagnosisError> {
         let directions = nuisance_directions(&self.reference.tolerance);
         let theta = self.reference.theta;
         let built = self.each(|i| {
             let base = replay(&self.drives[i], self.plant, &theta);
+            let old = self.nuisance.get(i).filter(|n| keep && n.raw.len() == directions.len());
+            let raw: Vec<Arc<Column>> = match old {
+                Some(n) => n.raw.clone(),
+                None => directions.iter().map(|d| self.raw(i, &theta, &base, d)).collect(),
+            };
             let columns: Vec<Column> = directions
                 .iter()
-                .map(|d| {
-                    let mut c = self.column(i, &theta, &base, d);
+                .zip(&raw)
+                .map(|(d, raw)| {
+                    let mut c = self.whiten_sensitivity(i, raw);
                     let sigma = self.reference.tolerance[d.p as usize];
                     c.iter_mut().flatten().for_each(|x| *x *= sigma);
                     c
@@ -302,7 +324,7 @@ impl<'a> Problem<'a> {
                 }
             }
             let whitened = self.whiten(i, &base);
-            s.cholesky().map(|factor| Nuisance { base, whitened, columns, factor })
+            s.cholesky().map(|factor| Nuisance { base, whitened, raw, columns, factor })
         });
         self.nuisance = built
             .into_iter()
@@ -327,7 +349,10 @@ impl<'a> Problem<'a> {
 
     /// Whitened sensitivity: minus the derivative of the residual along the direction.
     fn column(&self, i: usize, theta: &Theta, base: &Residuals, direction: &Direction) -> Column {
-        let raw = self.raw(i, theta, base, direction);
+        self.whiten_sensitivity(i, &self.raw(i, theta, base, direction))
+    }
+
+    fn whiten_sensitivity(&self, i: usize, raw: &Column) -> Column {
         core::array::from_fn(|m| {
             if raw[m].is_empty() {
                 return Vec::new();
@@ -634,7 +659,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Gauss-Newton steps of the common calibration.
-    fn calibrate(&mut self, clean: bool) -> Result<(), DiagnosisError> {
+    fn calibrate(&mut self, clean: bool, first: bool) -> Result<(), DiagnosisError> {
         if !clean {
             return Ok(());
         }
@@ -649,7 +674,7 @@ impl<'a> Problem<'a> {
         let mut theta = self.reference.theta;
         let (mut gram, _) = self.gram(&theta, &directions);
         let mut best = cost(gram.sum(|_| true).2, &theta);
-        for _ in 0..3 {
+        for _ in 0..if first { 4 } else { 2 } {
             let (mut a, mut b, _) = gram.sum(|_| true);
             for (j, s) in free.iter().enumerate() {
                 let precision = 1.0 / (s.calibration * s.calibration);
@@ -668,10 +693,10 @@ impl<'a> Problem<'a> {
                     let x = &mut t[s.p as usize];
                     *x = (*x + factor * d).clamp(s.lo, s.hi);
                 }
-                let (g, _) = self.gram(&t, &directions);
-                let c = cost(g.sum(|_| true).2, &t);
+                let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
                 if c < best {
-                    (theta, gram, best, improved) = (t, g, c, true);
+                    (theta, best, improved) = (t, c, true);
+                    gram = self.gram(&theta, &directions).0;
                 }
                 factor *= 0.4;
             }
@@ -679,9 +704,11 @@ impl<'a> Problem<'a> {
                 break;
             }
         }
-        self.creep(&mut theta, &mut best, &free, &cost);
+        if first {
+            self.creep(&mut theta, &mut best, &free, &cost);
+        }
         self.reference.theta = theta;
-        self.refresh()
+        if first { self.refresh() } else { self.follow() }
     }
 }
 

@@ -98,11 +98,11 @@ impl Problem<'_> {
                     let i = *p as usize;
                     t[i] = (t[i] + factor * d).clamp(zero[i] + s.lo, zero[i] + s.hi);
                 }
-                let (g, _) = self.gram(&t, &directions(&free, &t));
-                let c = cost(g.sum(|_| true).2, &t);
+                let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
                 if c < best {
                     improved = best - c;
-                    (theta, gram, best) = (t, g, c);
+                    (theta, best) = (t, c);
+                    gram = self.gram(&theta, &directions(&free, &theta)).0;
                     break;
                 }
                 factor *= 0.35;

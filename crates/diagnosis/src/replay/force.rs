@@ -75,7 +75,7 @@ pub(crate) struct Longitudinal<'a> {
     shift_m: f64,
     wind: [f64; 2],
     cold: f64,
-    warm_tau: f64,
+    cooling: f64,
     hot_brakes: bool,
     pressure_lag: f64,
 }
@@ -87,6 +87,8 @@ pub(crate) struct Slow {
     brake_k: f64,
     /// How far the fan is on, 0 to 1.
     fan: f64,
+    /// Extra rolling resistance of cold tyres, relative.
+    cold: f64,
 }
 
 impl<'a> Longitudinal<'a> {
@@ -108,7 +110,7 @@ impl<'a> Longitudinal<'a> {
             shift_m: t[P::MapShift as usize],
             wind: [t[P::WindX as usize], t[P::WindY as usize]],
             cold: if d.warm { 0.0 } else { t[P::WarmupAmp as usize] },
-            warm_tau: 1800.0 * t[P::WarmupTau as usize].exp(),
+            cooling: (-Drive::STEP_S / (1800.0 * t[P::WarmupTau as usize].exp())).exp(),
             hot_brakes: t[P::Fade as usize] != 0.0,
             pressure_lag: t[P::PressureLag as usize] / Drive::STEP_S,
             d,
@@ -144,10 +146,12 @@ impl<'a> Longitudinal<'a> {
         let eta = p.efficiency_frac * (1.0 - t[P::DrivelineLoss as usize]);
         let drive = net * per_m * if net > 0.0 { eta } else { 1.0 / eta };
         let grade = self.grade(i);
-        let slope = 1.0 / (1.0 + grade * grade).sqrt();
+        // The cosine changes by less than 1e-3 of a grade error: the map's counts.
+        let slope = d.slope[i];
         let mut rolling = self.rolling;
         if self.cold != 0.0 {
-            rolling *= 1.0 + self.cold * (-(i as f64) * Drive::STEP_S / self.warm_tau).exp();
+            slow.cold = if i == 0 { self.cold } else { slow.cold * self.cooling };
+            rolling *= 1.0 + slow.cold;
         }
         let resistance = self.mass * GRAVITY_M_S2 * slope * (rolling + grade);
         let service = self.service_brake(i, v, &mut slow.brake_k);
@@ -175,9 +179,11 @@ impl<'a> Longitudinal<'a> {
     #[inline]
     fn air(&self, i: usize, v: f64) -> f64 {
         let (along, across) = air_speed(self.d, self.t, self.wind, i, v);
+        if across == 0.0 {
+            return 0.5 * self.d.density[i] * self.cd_a * along.abs() * along;
+        }
         let speed2 = along * along + across * across;
-        let yaw =
-            if across == 0.0 { 0.0 } else { (across / along.abs().max(1.0)).atan().to_degrees() };
+        let yaw = (across / along.abs().max(1.0)).atan().to_degrees();
         0.5 * self.d.density[i]
             * self.cd_a
             * (1.0 + self.plant.drag_yaw_frac_per_deg * yaw.abs())
@@ -209,7 +215,7 @@ pub(super) fn air_speed(d: &Prepared, t: &Theta, wind: [f64; 2], i: usize, v: f6
     let mut along = v + t[P::Headwind as usize];
     let mut across = t[P::Crosswind as usize];
     if wind != [0.0, 0.0] {
-        let (sin, cos) = d.heading[i].sin_cos();
+        let (sin, cos) = d.course[i];
         along -= wind[0] * cos + wind[1] * sin;
         across += wind[1] * cos - wind[0] * sin;
     }

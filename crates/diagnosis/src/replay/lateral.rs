@@ -95,7 +95,7 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
     let bank = t[P::Bank as usize];
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     let dt = Drive::STEP_S;
-    let rows = d.n / 2 - 2;
+    let rows = (d.n / 2).saturating_sub(2);
     let mut out = [vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]];
     let mut s = [0.0_f64; 4];
     for i in 0..2 * rows {

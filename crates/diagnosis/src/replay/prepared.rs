@@ -15,6 +15,10 @@ pub(crate) struct Prepared {
     pub(crate) gps: Vec<f64>,
     pub(crate) altitude: Vec<f64>,
     pub(crate) heading: Vec<f64>,
+    /// Sine and cosine of the heading.
+    pub(crate) course: Vec<(f64, f64)>,
+    /// Cosine of the grade.
+    pub(crate) slope: Vec<f64>,
     pub(crate) accel_x: Vec<f64>,
     pub(crate) pedal: Vec<f64>,
     pub(crate) torque: Vec<f64>,
@@ -132,6 +136,8 @@ impl Prepared {
             warm: drive.tyres_warm_at_start.unwrap_or(true),
             gps: get(C::GpsSpeedMS, 0.0),
             altitude: get(C::GpsAltitudeM, 0.0),
+            course: heading.iter().map(|h| h.sin_cos()).collect(),
+            slope: grade.iter().map(|g| 1.0 / (1.0 + g * g).sqrt()).collect(),
             heading,
             accel_x: get(C::AccelXMS2, 0.0),
             pedal: get(C::AcceleratorPedalFrac, 0.0),
