@@ -1,5 +1,6 @@
 //! Drives that cannot be judged: a clear error or a stated verdict, never a panic and never a
 //! confident cause.
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 #[allow(dead_code, reason = "each user of the generator needs a part of it")]
 mod support;

@@ -1,5 +1,6 @@
 //! Effects hidden in short generated drives are found, and nothing is found where nothing is. The
 //! full campaign (drives of 25 minutes, every cause) is `examples/campaign.rs`.
+#![allow(clippy::unwrap_used, reason = "helpers of tests are tests")]
 
 #[allow(dead_code, reason = "each user of the generator needs a part of it")]
 mod support;
