@@ -2,15 +2,20 @@
 //! gain.
 #![cfg_attr(test, allow(clippy::indexing_slicing))]
 
+pub mod balance;
+pub mod carbon;
 mod channel;
 pub mod clock;
+pub mod coast_down;
 mod diagnosis;
 mod drive;
 mod error;
 mod executor;
 mod finding;
+pub mod fit;
 mod gain;
 mod hypothesis;
+pub mod lateral_id;
 mod overlay;
 mod param;
 mod plant;

@@ -1,34 +1,61 @@
 //! Studies of measured data that the project did not make: one command per data set.
 //!
-//! `real_data SET DIR [OUT]`, SET one of `findings`, `ostfalia`, `isuzu`, `vt_ucr`, `revs`,
-//! `bosch`. DIR is the data folder (or one file of it); pictures and figures go to OUT, if given.
+//! `real_data SET DIR [OUT [TRUCK.toml]]`, SET one of `findings`, `ostfalia`, `isuzu`, `vt_ucr`,
+//! `revs`. DIR is the data folder (or one file of it); pictures go to OUT. TRUCK.toml is the
+//! truck file or overlay of the vehicle; without it the one beside this program is taken.
 //! `findings` reads any folder of measured drives. What the data can and cannot decide is written
 //! in docs/real-data.md.
 #![expect(clippy::disallowed_macros, reason = "an example prints")]
 
+mod isuzu;
 mod ostfalia;
 mod plot;
+mod revs;
 mod table;
+mod vt_ucr;
 
 use std::path::{Path, PathBuf};
 
-type Outcome = Result<(), Box<dyn std::error::Error>>;
+use dynamics::{Overlay, TruckParameters};
+
+type Outcome<T = ()> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> Outcome {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [set, dir, rest @ ..] = arguments.as_slice() else {
-        return Err("usage: real_data findings|ostfalia|isuzu|vt_ucr|revs|bosch DIR [OUT]".into());
+        return Err(
+            "usage: real_data findings|ostfalia|isuzu|vt_ucr|revs DIR [OUT [TRUCK.toml]]".into()
+        );
     };
     let dir = Path::new(dir);
     let out = rest.first().map(PathBuf::from);
     if let Some(out) = &out {
         std::fs::create_dir_all(out)?;
     }
+    let out = out.as_deref();
     match set.as_str() {
         "findings" => findings(dir),
-        "ostfalia" => ostfalia::study(dir, out.as_deref()),
+        "isuzu" => {
+            isuzu::study(dir, out, &truck(rest, include_str!("trucks/isuzu_npr.toml"))?).map(drop)
+        }
+        "revs" => {
+            revs::study(dir, out, &truck(rest, include_str!("trucks/ferrari250lm.toml"))?).map(drop)
+        }
+        "vt_ucr" => {
+            vt_ucr::study(dir, out, &truck(rest, include_str!("trucks/vt_ucr.toml"))?).map(drop)
+        }
+        "ostfalia" => ostfalia::study(dir, out).map(drop),
         other => Err(format!("{other:?} is no data set of this program").into()),
     }
+}
+
+/// The vehicle: the file that was named, or the overlay that comes with the data set.
+fn truck(rest: &[String], overlay: &str) -> Result<TruckParameters, Box<dyn std::error::Error>> {
+    if let Some(file) = rest.get(1) {
+        return Ok(TruckParameters::load(file)?);
+    }
+    let overlay: Overlay = toml::from_str(overlay)?;
+    Ok(TruckParameters::load(&overlay.base)?.with_overlay(&overlay)?)
 }
 
 /// Defects of any folder of measured drives.

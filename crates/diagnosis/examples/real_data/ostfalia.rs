@@ -8,13 +8,17 @@
 
 use std::path::Path;
 
-use diagnosis::clock::{Kind, Rates, Signal, track};
-use diagnosis::{Channel, Drive, read_drives};
+use diagnosis::clock::{ClockTrack, Kind, Rates, Signal, track};
+use diagnosis::{Channel, Drive, Finding, read_drives};
 
 use crate::plot::{Panel, Series, write};
 use crate::table::{at, column, files, read, stem};
 
-pub(crate) fn study(dir: &Path, out: Option<&Path>) -> crate::Outcome {
+/// Name of a trip and the lag along it.
+pub(crate) type Trip = (String, ClockTrack);
+
+/// What the reading stage found, and the lag of every trip.
+pub(crate) fn study(dir: &Path, out: Option<&Path>) -> crate::Outcome<(Vec<Finding>, Vec<Trip>)> {
     let folder = std::env::temp_dir().join(format!("real_data_{}", std::process::id()));
     let folder = out.map_or(folder, |o| o.join("drives"));
     std::fs::create_dir_all(&folder)?;
@@ -32,10 +36,13 @@ pub(crate) fn study(dir: &Path, out: Option<&Path>) -> crate::Outcome {
     for f in &set.findings {
         println!("{}", serde_json::to_string(f)?);
     }
+    let mut tracks = Vec::new();
     for drive in &set.drives {
-        report(drive, out)?;
+        if let Some(found) = report(drive, out)? {
+            tracks.push((drive.name.clone(), found));
+        }
     }
-    Ok(())
+    Ok((set.findings, tracks))
 }
 
 /// Both loggers on one table of 20 Hz.
@@ -78,7 +85,7 @@ fn join(
     Ok(csv)
 }
 
-fn report(drive: &Drive, out: Option<&Path>) -> crate::Outcome {
+fn report(drive: &Drive, out: Option<&Path>) -> crate::Outcome<Option<ClockTrack>> {
     let (Some(wheel), Some(gps)) = (drive.get(Channel::SpeedMS), drive.get(Channel::GpsSpeedMS))
     else {
         return Err(format!("{}: a speed is missing", drive.name).into());
@@ -86,7 +93,7 @@ fn report(drive: &Drive, out: Option<&Path>) -> crate::Outcome {
     let signal = |samples| Signal { samples, kind: Kind::Value };
     let Some(found) = track(&Rates::new(signal(gps), signal(wheel), Drive::STEP_S)) else {
         println!("{}: the two speeds do not move together anywhere", drive.name);
-        return Ok(());
+        return Ok(None);
     };
     println!("{}: correlation as recorded {:.3}", drive.name, found.correlation_as_recorded);
     for s in &found.stretches {
@@ -150,5 +157,5 @@ fn report(drive: &Drive, out: Option<&Path>) -> crate::Outcome {
             ],
         )?;
     }
-    Ok(())
+    Ok(Some(found))
 }
