@@ -124,8 +124,12 @@ pub struct PowertrainLimits {
     pub full_load_nm: Curve,
     /// Friction torque over engine speed (rad/s), Nm, positive.
     pub friction_nm: Curve,
-    /// Engine-brake and retarder torque at the crank at full demand over engine speed, Nm, positive.
+    /// Engine-brake torque at the crank at full demand over engine speed, Nm, positive.
     pub engine_brake_nm: Curve,
+    /// Force of a retarder behind the gearbox at the wheels at full demand over road speed (m/s), N,
+    /// positive; it adds to the engine brake. `None`: there is no such retarder.
+    #[serde(default)]
+    pub retarder_force_n: Option<Curve>,
     /// Auxiliary power at the crank, W.
     pub auxiliary_power_w: f64,
     /// Idle speed, rad/s.

@@ -165,6 +165,12 @@ impl TruckModel {
                 DynamicsError::OutOfBounds { name: p.name.clone(), violations: vec![e.to_string()] }
             })
         };
+        let road_speeds: Vec<f64> = (0..=40).map(f64::from).collect();
+        let retarder = |v: &f64| d.shaft_force_n(d.retarder_limit_nm(*v));
+        let retarder_n = road_speeds.iter().map(retarder).collect();
+        let retarder_n = Curve::new("retarder", road_speeds, retarder_n).map_err(|e| {
+            DynamicsError::OutOfBounds { name: p.name.clone(), violations: vec![e.to_string()] }
+        })?;
         let idle = self.engine.idle_rad_s;
         let holding = self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, false);
         Ok(VehicleLimits {
@@ -181,6 +187,7 @@ impl TruckModel {
                 full_load_nm: self.engine.full_load_nm.clone(),
                 friction_nm: tabulate("friction", &|n| self.engine.friction_nm(n))?,
                 engine_brake_nm: tabulate("engine brake", &|n| self.engine.engine_brake_nm(n))?,
+                retarder_force_n: (d.retarder_torque_nm > 0.0).then_some(retarder_n),
                 auxiliary_power_w: e.auxiliary_power_w,
                 idle_speed_rad_s: idle,
                 max_speed_rad_s: self.engine.max_rad_s,

@@ -24,6 +24,8 @@ pub struct InGear<'a> {
     pub engine_speed_rad_s: f64,
     /// Rotating inertia felt as mass, kg.
     pub rotating_mass_kg: f64,
+    /// Largest force of a retarder behind the gearbox at the wheels, N, positive.
+    retarder_n: f64,
 }
 
 impl<'a> InGear<'a> {
@@ -50,6 +52,7 @@ impl<'a> InGear<'a> {
             engine_speed_rad_s: (speed_m_s * leverage_1_m)
                 .clamp(powertrain.idle_speed_rad_s, powertrain.max_speed_rad_s),
             rotating_mass_kg: powertrain.rotating_mass_kg.get(index).copied().unwrap_or(0.0),
+            retarder_n: powertrain.retarder_force_n.as_ref().map_or(0.0, |f| f.at(speed_m_s)),
         }
     }
 
@@ -92,6 +95,7 @@ impl<'a> InGear<'a> {
     pub fn max_retarder_force_n(&self) -> f64 {
         self.powertrain.engine_brake_nm.at(self.engine_speed_rad_s) * self.leverage_1_m
             / self.efficiency_frac
+            + self.retarder_n
     }
 
     /// Accelerator pedal, 0 to 1, that gives the wheel force, by inverting the pedal map.

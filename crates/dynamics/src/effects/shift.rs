@@ -64,6 +64,11 @@ fn one() -> f64 {
     1.0
 }
 
+/// From this pedal on a gear does not rest: the driver or the planner wants power.
+const KICK_DOWN_FRAC: f64 = 0.9;
+/// Lowest engine speed at which a gear rests, relative to the down-shift speed at pedal 0.
+const LUGGING_FACTOR: f64 = 1.1;
+
 /// Where a shift stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum ShiftPhase {
@@ -206,6 +211,9 @@ impl ShiftParameters {
         let braking = view.retarder_frac > 0.3 || view.brake_decel_m_s2 > 0.8;
         let (up, down) = if braking {
             (0.97 * view.max_rad_s, self.braking_speed_rpm / RPM_PER_RAD_S)
+        } else if view.retarder_frac > 0.0 {
+            // A demand that has fallen because the lower gear brakes better is no reason to leave it.
+            (0.97 * view.max_rad_s, at(self.down_speed_rpm))
         } else {
             (at(self.up_speed_rpm), at(self.down_speed_rpm))
         };
@@ -213,6 +221,20 @@ impl ShiftParameters {
             let n = speed_in(g);
             n > 1.0 && view.power_w / n < 0.92 * view.full_load_nm.at(n)
         };
+        // A gear rests where it carries the present power without kick-down and above lugging. The
+        // next gear is taken early if it would rest, and a gear that rests is kept.
+        let rests_in = |g: usize, margin: f64| {
+            let speed = speed_in(g);
+            let pedal = view.pedal_frac * n / speed.max(1.0);
+            let lugging = LUGGING_FACTOR * self.down_speed_rpm[0] / RPM_PER_RAD_S;
+            !braking && pedal * margin < KICK_DOWN_FRAC && speed > margin * lugging && carries(g)
+        };
+        if now < top && n <= up && view.pedal_frac > 0.0 && rests_in(now + 1, 1.05) {
+            return gear + 1;
+        }
+        if n < down && rests_in(now, 1.0) {
+            return gear;
+        }
         if n > up && now < top {
             let fits = |g: &usize| {
                 speed_in(*g) > 1.03 * down && (carries(*g) || n > 0.96 * view.max_rad_s)

@@ -77,6 +77,7 @@ pub fn reference_limits() -> VehicleLimits {
             friction_nm: Curve::new("friction", speed.clone(), of_rpm(|n| 95.0 + 0.085 * n))
                 .unwrap(),
             engine_brake_nm: Curve::new("brake", speed, of_rpm(|n| 100.0 + 0.45 * n)).unwrap(),
+            retarder_force_n: None,
             auxiliary_power_w: 4000.0,
             idle_speed_rad_s: 600.0 / RPM_PER_RAD_S,
             max_speed_rad_s: 2100.0 / RPM_PER_RAD_S,
