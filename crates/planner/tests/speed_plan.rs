@@ -4,9 +4,9 @@
 
 mod support;
 
-use planner::pcc::Tuning;
 use planner::pcc::horizon::{HorizonConfig, HorizonFailure, HorizonPlanner, HorizonRequest};
 use planner::pcc::horizon_fence::LeadAhead;
+use planner::pcc::{SpeedBand, TripRequest, Tuning, plan_trip};
 use planner::{SpeedPlannerKind, Stack, StackConfig, drive_tick};
 use proptest::prelude::*;
 use road::{ProfilePoint, builtin};
@@ -71,6 +71,52 @@ fn before_a_descent_the_plan_gives_up_speed_that_the_descent_returns() {
     assert!(v(1_000.0) < 19.0, "{} at the edge", v(1_000.0));
     assert!(v(1_800.0) > 21.0, "{} at the foot", v(1_800.0));
     assert!(plan.driven.v_m_s(40) < 22.2 + 1e-6);
+}
+
+#[test]
+fn eco_roll_opens_the_driveline_where_that_pays_and_never_where_the_truck_brakes() {
+    // 19 t: the engine's drag weighs more than with 55 t
+    let mut limits = reference_limits();
+    limits.road_load.mass_kg = 19_000.0;
+    let road = hills(10_000.0, 0.02, 2_000.0, 0.0);
+    let plan = |eco_roll: bool| {
+        let band = SpeedBand { set_m_s: 20.0, min_m_s: 17.0, max_m_s: 23.0 };
+        let tuning = Tuning::default();
+        let (profile, truck) = (&road[..], &limits);
+        plan_trip(&TripRequest { profile, truck, band, trip_time_s: None, eco_roll, tuning })
+            .unwrap()
+    };
+    let (closed, open) = (plan(false), plan(true));
+    assert!(closed.rows.iter().all(|r| r.gear != 0));
+    let (without, with) = (closed.plan.fuel_g, open.plan.fuel_g);
+    assert!(with < 0.999 * without, "{with:.1} g against {without:.1} g");
+    assert!(open.plan.trip_time_s < closed.plan.trip_time_s * 1.002);
+    let (mut phase_m, mut phases) = (0.0, Vec::new());
+    for w in open.rows.windows(2) {
+        if w[0].gear == 0 {
+            assert!(w[0].brake_force_n < 50.0, "{:?}", w[0]);
+            phase_m += w[1].s_m - w[0].s_m;
+        } else if phase_m > 0.0 {
+            phases.push(phase_m);
+            phase_m = 0.0;
+        }
+    }
+    assert!(!phases.is_empty());
+    assert!(phases.iter().all(|&m| m > 199.0), "{phases:?}");
+}
+
+#[test]
+fn the_horizon_opens_the_driveline_only_if_it_may() {
+    let mut limits = reference_limits();
+    limits.road_load.mass_kg = 19_000.0;
+    let road = hills(4_000.0, 0.015, 2_000.0, 0.0);
+    for eco_roll in [false, true] {
+        let config = HorizonConfig { eco_roll, ..HorizonConfig::default() };
+        let mut planner = HorizonPlanner::new(config, Tuning::default());
+        let plan = planner.plan(&request(&road, &limits)).unwrap();
+        let open = plan.driven.drive.iter().filter(|d| d.number() == 0).count();
+        assert_eq!(open >= 8, eco_roll, "{open} intervals open");
+    }
 }
 
 proptest! {
@@ -257,7 +303,7 @@ fn a_slow_car_is_approached_without_braking_hard_and_followed_at_its_speed() {
     assert!(fenced && hardest < 0.3, "{hardest} m/s2");
     let gap_m = 450.0 + 15.0 * 120.0 - plant.ego.s_m - limits.geometry.front_m;
     assert!((plant.ego.speed_m_s - 15.0).abs() < 0.6, "{}", plant.ego.speed_m_s);
-    assert!((45.0..150.0).contains(&gap_m), "{gap_m} m");
+    assert!((45.0..200.0).contains(&gap_m), "{gap_m} m");
 }
 
 #[test]

@@ -20,6 +20,7 @@ use tractrix_core::VehicleLimits;
 use super::course::Tuning;
 use super::cruise::cruise_energies;
 use super::drive::Driven;
+use super::eco_roll;
 use super::error::PccError;
 use super::horizon_fence::{Fence, LeadAhead};
 use super::horizon_setting::{Candidate, Known, Setting};
@@ -37,7 +38,7 @@ const SWITCH_GAIN_G: f64 = 1.0;
 /// `k_a` of a plan behind a fence, g s³/m²: slowing down early and hard costs no fuel, but comfort.
 const FENCED_ACCEL_PENALTY: f64 = 10.0;
 /// Length of a plan behind a fence, m: elapsed times make its subproblem several times dearer.
-const FENCED_M: f64 = 2_000.0;
+const FENCED_M: f64 = 1_500.0;
 
 /// Settings of the receding horizon.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -270,30 +271,42 @@ impl HorizonPlanner {
         let mut budget = Budget { left: self.config.iteration_budget, used: 0 };
         let free = Setting::new(known, request, &self.config, &self.tuning)?;
         self.keep_time(known, &free, request, &mut budget)?;
-        let plan = self.solve(known, &free, request, None, &mut budget)?;
-        let shadow_s = self.clock.shadow_time_s(free.course.n()).unwrap_or(0.0);
-        let fence = request.lead.map(|lead| {
-            let (truck, e) = (&known.truck, &plan.driven.e_j_kg);
-            Fence::new(truck, &free.course, e, &lead, self.config.lead_s)
-        });
-        match (fence, request.lead) {
-            (Some(fence), Some(lead)) if fence.cuts(free.course.h_m, &plan.driven.e_j_kg) => {
-                let points = request.profile;
-                let last = points.partition_point(|p| p.s_m <= points[0].s_m + FENCED_M).max(2);
-                let near =
-                    HorizonRequest { profile: &points[..last.min(points.len())], ..*request };
-                let mut setting = Setting::new(known, &near, &self.config, &self.tuning)?;
-                let lead_s = self.config.lead_s;
-                let e = &plan.driven.e_j_kg;
-                let fence = Fence::new(&known.truck, &setting.course, e, &lead, lead_s);
-                setting.stay_behind(&fence, &lead);
-                self.solve(known, &setting, request, Some(&fence), &mut budget)
-            }
-            _ => {
-                self.clock.expect(plan.driven.trip_time_s() - shadow_s);
-                Ok(plan)
-            }
+        if let Some(plan) = self.behind(known, request, &free, free.cruise(), &mut budget)? {
+            return Ok(plan);
         }
+        let plan = self.solve(known, &free, request, None, &mut budget)?;
+        let e = plan.driven.e_j_kg.clone();
+        if let Some(plan) = self.behind(known, request, &free, &e, &mut budget)? {
+            return Ok(plan);
+        }
+        let shadow_s = self.clock.shadow_time_s(free.course.n()).unwrap_or(0.0);
+        self.clock.expect(plan.driven.trip_time_s(), shadow_s);
+        Ok(plan)
+    }
+
+    /// The plan behind the vehicle ahead, if driving `e_j_kg` (per node) comes too near to it.
+    fn behind(
+        &mut self,
+        known: &Known,
+        request: &HorizonRequest<'_>,
+        free: &Setting,
+        e_j_kg: &[f64],
+        budget: &mut Budget,
+    ) -> Result<Option<HorizonPlan>, HorizonFailure> {
+        let Some(lead) = request.lead else { return Ok(None) };
+        let (truck, lead_s) = (&known.truck, self.config.lead_s);
+        let fence = Fence::new(truck, &free.course, e_j_kg, &lead, lead_s);
+        if !fence.cuts(free.course.h_m, e_j_kg) {
+            return Ok(None);
+        }
+        let points = request.profile;
+        let last = points.partition_point(|p| p.s_m <= points[0].s_m + FENCED_M).max(2);
+        let near = HorizonRequest { profile: &points[..last.min(points.len())], ..*request };
+        let mut setting = Setting::new(known, &near, &self.config, &self.tuning)?;
+        let e = &e_j_kg[..=setting.course.n().min(e_j_kg.len() - 1)];
+        let fence = Fence::new(truck, &setting.course, e, &lead, lead_s);
+        setting.stay_behind(&fence, &lead);
+        self.solve(known, &setting, request, Some(&fence), budget).map(Some)
     }
 
     /// Moves the shadow cruise control on; at the first plan finds the price of time.
@@ -322,7 +335,7 @@ impl HorizonPlanner {
                     budget.solve(solver, sub, end, time, f)
                 });
             let found = if is_usable(probe.status) { probe.beta_g_s } else { guess };
-            self.clock.begin(found.clamp(0.2 * guess, 2.0 * guess));
+            self.clock.begin(found.clamp(0.3 * guess, 1.1 * guess));
         }
         Ok(())
     }
@@ -356,7 +369,9 @@ impl HorizonPlanner {
         let mut best = None;
         let mut failed = SolveStatus::Failed;
         let mut keep = |candidate: Candidate, gain_g: f64| {
-            let usable = is_usable(candidate.profile.status);
+            let driven = &candidate.driven;
+            let usable = is_usable(candidate.profile.status)
+                && !(0..driven.drive.len()).any(|k| eco_roll::runs_away(driven, k));
             if !usable {
                 failed = candidate.profile.status;
             } else if best
@@ -370,7 +385,7 @@ impl HorizonPlanner {
             problem.fence_s = Some(fence.earliest_s.clone());
             let e = &fence.follow_e_j_kg;
             let gears = setting.gears_along(known, &problem, e);
-            keep(run(&problem, e, &gears, most + 1), 0.0);
+            keep(run(&problem, e, &gears, most), 0.0);
         } else {
             let (e, gears) = setting.searched(known, &problem, beta);
             let same = warm.as_ref().is_some_and(|warm| warm.1 == gears);
@@ -381,10 +396,25 @@ impl HorizonPlanner {
                 keep(run(&problem, &e, &gears, most), SWITCH_GAIN_G);
             }
         }
-        let iterations = budget.used;
-        let Some(best) = best else {
-            return Err(HorizonFailure::Solver { status: failed, iterations });
+        let Some(mut best) = best else {
+            return Err(HorizonFailure::Solver { status: failed, iterations: budget.used });
         };
+        let rolls = best.driven.drive.contains(&Drive::Neutral);
+        if self.config.eco_roll && fence.is_none() && !rolls {
+            let iterations = Iterations { most, ..Iterations::TRIP };
+            let mut again = |sub: &Subproblem, end, time, f: Option<&[f64]>| {
+                budget.solve(&mut self.solver, sub, end, time, f)
+            };
+            let open =
+                eco_roll::opened(&problem, &best.profile, &best.driven, iterations, &mut again);
+            if let Some(profile) = open {
+                let other = setting.driven(&problem, profile, beta);
+                if other.cost_g + SWITCH_GAIN_G < best.cost_g {
+                    best = other;
+                }
+            }
+        }
+        let iterations = budget.used;
         Ok(HorizonPlan {
             start_s_m: setting.course.start_s_m,
             h_m: setting.course.h_m,

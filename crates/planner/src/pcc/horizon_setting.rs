@@ -149,6 +149,11 @@ impl Setting {
         Ok(Self { course, hold, terminal, start_e, cruise, e_min, e_max })
     }
 
+    /// Cruise control at the set speed from the truck's speed on, J/kg per node.
+    pub(super) fn cruise(&self) -> &[f64] {
+        &self.cruise
+    }
+
     /// Makes room for the profile behind a fence; without a library solver, which alone knows
     /// elapsed times, that profile is the ceiling.
     pub(super) fn stay_behind(&mut self, fence: &Fence, lead: &LeadAhead) {
@@ -181,7 +186,7 @@ impl Setting {
             fence_s: None,
             eco_roll: false,
             start_gear: None,
-            cut: CutModel::Hull,
+            cut: CutModel::Charged,
             forced_cut: Vec::new(),
         }
     }

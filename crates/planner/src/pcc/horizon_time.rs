@@ -4,10 +4,12 @@
 //! A shadow truck drives the same road with power-limited cruise control at the set speed. It moves
 //! along with the real one, so its clock at the real truck's station is the trip time to be met, on
 //! any road and without a timetable. The price of a second, β, follows
-//! `ln(β/β₀) = K_p L + K_i Σ L`, `L` the lateness that the last plan expects at its end: what the
-//! truck is late now, and what the plan takes longer than the shadow. β₀ is the multiplier of the
+//! `ln(β/β₀) = K_p L/T + K_i Σ L/T`, `T` the duration of the last plan and `L` the lateness that it
+//! expects at its end: what the truck is late now, and what the plan takes longer than the shadow. β₀ is the multiplier of the
 //! trip time in the first plan. One price for a whole trip is optimal (β is a costate of a state
-//! that enters no dynamics), so the gains are low.
+//! that enters no dynamics), so the gains are low. They have to be: the speed grows with the cube
+//! root of β, so a plan answers with `dL = -(T/3) d ln β`, and from `K_p = 3` on the price would
+//! swing from plan to plan.
 //!
 //! Time lost behind traffic is not made up for: while traffic rules, the clocks run alike.
 
@@ -15,12 +17,12 @@ use alloc::vec::Vec;
 
 use super::drive::duration_s;
 
-/// Lateness to relative price, 1/s.
-const PROPORTIONAL_1_S: f64 = 0.02;
-/// The same per plan, summed, 1/s.
-const INTEGRAL_1_S: f64 = 0.004;
+/// `K_p`: relative lateness to logarithm of the price.
+const PROPORTIONAL: f64 = 1.0;
+/// `K_i`: the same per plan, summed.
+const INTEGRAL: f64 = 0.3;
 /// Largest logarithm of the relative price, down and up.
-const RANGE: (f64, f64) = (-2.5, 1.4);
+const RANGE: (f64, f64) = (-2.5, 0.4);
 
 /// The shadow's drive over the horizon of one plan.
 #[derive(Debug, Clone, Default)]
@@ -51,8 +53,8 @@ pub struct TripClock {
     shadow: Option<Shadow>,
     plan_time_s: f64,
     late_s: f64,
-    expected_s: f64,
-    sum_s: f64,
+    expected_frac: f64,
+    sum_frac: f64,
     first_g_s: Option<f64>,
 }
 
@@ -87,11 +89,11 @@ impl TripClock {
         self.shadow.as_ref().and_then(|shadow| shadow.time_s.get(k)).copied()
     }
 
-    /// Takes the lateness at its end that a plan expects relative to the shadow, s.
-    pub fn expect(&mut self, plan_minus_shadow_s: f64) {
-        self.expected_s = self.late_s + plan_minus_shadow_s;
-        let room = RANGE.1 / INTEGRAL_1_S;
-        self.sum_s = (self.sum_s + self.expected_s).clamp(-room, room);
+    /// Takes the durations of a plan and of the shadow over the same road, s.
+    pub fn expect(&mut self, plan_s: f64, shadow_s: f64) {
+        self.expected_frac = (self.late_s + plan_s - shadow_s) / plan_s.max(1.0);
+        let room = RANGE.1 / INTEGRAL;
+        self.sum_frac = (self.sum_frac + self.expected_frac).clamp(-room, room);
     }
 
     /// Lateness now, s, time behind traffic not counted.
@@ -103,7 +105,7 @@ impl TripClock {
     /// Price of time, g/s; `None` before [`Self::begin`].
     #[must_use]
     pub fn price_g_s(&self) -> Option<f64> {
-        let log = PROPORTIONAL_1_S * self.expected_s + INTEGRAL_1_S * self.sum_s;
+        let log = PROPORTIONAL * self.expected_frac + INTEGRAL * self.sum_frac;
         self.first_g_s.map(|beta| beta * libm::exp(log.clamp(RANGE.0, RANGE.1)))
     }
 
@@ -125,10 +127,28 @@ mod tests {
         // 100 m at 20 m/s are 5 s: 7 s are 2 s late
         assert_eq!(clock.advance(100.0, 7.0, false), Some(200.0));
         assert!((clock.late_s() - 2.0).abs() < 1e-12);
-        clock.expect(1.0);
+        clock.expect(101.0, 100.0);
         assert!(clock.price_g_s().unwrap() > 3.0);
-        clock.expect(-60.0);
+        clock.expect(100.0, 160.0);
         assert!(clock.price_g_s().unwrap() < 3.0);
+    }
+
+    #[test]
+    fn the_price_settles_although_every_plan_answers_it() {
+        let mut clock = TripClock::default();
+        clock.begin(3.0);
+        let duration_s = 10_000.0 / 20.0;
+        let (mut last, mut swings) = (0.0_f64, 0);
+        for _ in 0..400 {
+            let beta = clock.price_g_s().unwrap();
+            // The plan's duration against the shadow's, v ~ β^(1/3); equal at 2.5 g/s
+            let plan_s = duration_s * (2.5 / beta).cbrt();
+            let late = plan_s - duration_s;
+            clock.expect(plan_s, duration_s);
+            swings += i32::from(late * last < 0.0);
+            last = late;
+        }
+        assert!(last.abs() < 0.1 && swings <= 4, "{last} s after {swings} swings");
     }
 
     #[test]

@@ -21,6 +21,7 @@
 //! | [`gears`] | shift places along a profile |
 //! | [`sqp`] | the iteration |
 //! | [`trip`] | whole trips against both baselines |
+//! | [`eco_roll`] | coasting with the driveline open |
 //! | [`horizon`] | the next kilometres, renewed while driving |
 //! | [`horizon_time`] | trip-time controller: the price of a second |
 //! | [`horizon_fence`] | staying behind a vehicle ahead |
@@ -32,6 +33,7 @@ pub mod clarabel_backend;
 pub mod course;
 pub mod cruise;
 pub mod drive;
+pub mod eco_roll;
 mod error;
 pub mod gears;
 pub mod horizon;

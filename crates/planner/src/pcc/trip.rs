@@ -8,6 +8,7 @@ use tractrix_core::VehicleLimits;
 use super::course::{Course, MIN_SPEED_M_S, SpeedBand, Tuning};
 use super::cruise::{cruise_energies, cruise_trip};
 use super::drive::{Driven, drive_profile};
+use super::eco_roll;
 use super::error::{PccError, check};
 use super::gears::{GearChoice, choose_gears};
 use super::lin::{Terminal, TimeRule};
@@ -318,6 +319,13 @@ impl Trip {
             let other = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
             self.keep_better(&problem, trip_time_s, other, &mut best);
             problem.cut = CutModel::Hull;
+        }
+        problem.forced_cut.clear();
+        let rolling = best.as_ref().filter(|_| self.eco_roll).and_then(|(_, driven, kept)| {
+            eco_roll::opened(&problem, kept, driven, Iterations::TRIP, solver)
+        });
+        if let Some(other) = rolling {
+            self.keep_better(&problem, trip_time_s, other, &mut best);
         }
         let Some((_, driven, profile)) = best else {
             return (self.cruise.clone(), Profile::failed(cruise));

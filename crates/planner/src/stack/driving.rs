@@ -128,6 +128,9 @@ impl Stack {
                 speed_m_s: lead.speed_m_s,
                 wanted_gap_m: steady_gap_m(&self.config.following, &response, &lead),
             });
+        let lead = lead.filter(|lead| {
+            self.config.decider == DeciderKind::KeepLane || self.speed.settled(ego, lead)
+        });
         let ahead = Ahead { now, ego, road, lane: maneuver.path().lane, limits, lead };
         self.speed.update(self.ticks, &self.config, &ahead);
     }
@@ -228,8 +231,10 @@ impl Stack {
         self.plan.target_accel_m_s2 = speed.accel_m_s2;
         self.plan.target_d_m = ego.d_m - error.offset_m;
         self.plan.lateral_error_m = error.offset_m;
+        // An open driveline has no use for the pedal.
+        let pedal = if gear == GearRequest::Neutral { 0.0 } else { speed.accelerator_pedal_frac };
         Command {
-            accelerator_pedal_frac: speed.accelerator_pedal_frac,
+            accelerator_pedal_frac: pedal,
             xbr_decel_m_s2: speed.xbr_decel_m_s2,
             brake_mode: speed.brake_mode,
             steering_wheel_rad: wheel_rad * limits.lateral.steering_ratio,

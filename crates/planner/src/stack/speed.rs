@@ -128,6 +128,17 @@ impl SpeedPlanning {
         self.held_up = true;
     }
 
+    /// Whether the truck has settled behind a vehicle ahead. Before, a decider that may change lanes
+    /// is not kept at a distance from which it would never overtake: car following approaches.
+    pub(super) fn settled(&self, ego: &EgoState, lead: &LeadAhead) -> bool {
+        let (near, alike) = if self.lead == Some(lead.id) && self.last().is_some_and(|p| p.fenced) {
+            (2.0, 3.0)
+        } else {
+            (1.3, 0.7)
+        };
+        lead.gap_m < near * lead.wanted_gap_m && (ego.speed_m_s - lead.speed_m_s).abs() < alike
+    }
+
     /// Plans if it is time to.
     pub(super) fn update(&mut self, ticks: u64, config: &StackConfig, ahead: &Ahead<'_>) {
         let since = self.planned_at.map_or(u64::MAX, |at| ticks.wrapping_sub(at));
