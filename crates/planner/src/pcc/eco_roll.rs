@@ -97,10 +97,11 @@ fn phases(problem: &Problem<'_>, plan: &Profile, driven: &Driven) -> Vec<Range<u
     let mut k = 0;
     while k < course.n() {
         let run: Vec<f64> = (k..course.n()).map_while(gain).collect();
-        if let Some((range, sum_g)) = largest_sum(&run) {
-            if range.len() >= shortest && sum_g > 2.0 * tuning.shift_fuel_g {
-                found.push(k + range.start..k + range.end);
-            }
+        let best = largest_sum(&run);
+        if let Some((range, sum_g)) = best.filter(|(range, _)| range.len() >= shortest)
+            && sum_g > 2.0 * tuning.shift_fuel_g
+        {
+            found.push(k + range.start..k + range.end);
         }
         k += run.len() + 1;
     }
