@@ -2,6 +2,8 @@
 #![expect(clippy::disallowed_macros, reason = "the studies print")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+#[path = "../examples/real_data/bosch.rs"]
+mod bosch;
 #[path = "../examples/real_data/isuzu.rs"]
 mod isuzu;
 #[path = "../examples/real_data/ostfalia.rs"]
@@ -93,6 +95,14 @@ fn fuel_and_carbon_of_a_truck_disagree_with_load() {
         assert!(last.ratio < CO2_PER_FUEL.0 - 4.0 * last.sigma);
         let c = consumption.unwrap();
         assert!(c.fuel_g_kwh > 1.15 * c.carbon_g_kwh);
+    }
+}
+
+#[test]
+fn rows_without_time_bound_the_mass_but_do_not_tell_38_from_49_t() {
+    let Some(dir) = folder("bosch_truck_mass_slope") else { return };
+    for (label, _, direct, reverse) in bosch::study(&dir).unwrap() {
+        assert!(direct < label && label < reverse, "{label} t: {direct} to {reverse}");
     }
 }
 

@@ -1,12 +1,13 @@
 //! Studies of measured data that the project did not make: one command per data set.
 //!
 //! `real_data SET DIR [OUT [TRUCK.toml]]`, SET one of `findings`, `ostfalia`, `isuzu`, `vt_ucr`,
-//! `revs`. DIR is the data folder (or one file of it); pictures go to OUT. TRUCK.toml is the
+//! `revs`, `bosch`. DIR is the data folder (or one file of it); pictures go to OUT. TRUCK.toml is the
 //! truck file or overlay of the vehicle; without it the one beside this program is taken.
 //! `findings` reads any folder of measured drives. What the data can and cannot decide is written
 //! in docs/real-data.md.
 #![expect(clippy::disallowed_macros, reason = "an example prints")]
 
+mod bosch;
 mod isuzu;
 mod ostfalia;
 mod plot;
@@ -24,7 +25,8 @@ fn main() -> Outcome {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [set, dir, rest @ ..] = arguments.as_slice() else {
         return Err(
-            "usage: real_data findings|ostfalia|isuzu|vt_ucr|revs DIR [OUT [TRUCK.toml]]".into()
+            "usage: real_data findings|bosch|ostfalia|isuzu|vt_ucr|revs DIR [OUT [TRUCK.toml]]"
+                .into(),
         );
     };
     let dir = Path::new(dir);
@@ -35,6 +37,7 @@ fn main() -> Outcome {
     let out = out.as_deref();
     match set.as_str() {
         "findings" => findings(dir),
+        "bosch" => bosch::study(dir).map(drop),
         "isuzu" => {
             isuzu::study(dir, out, &truck(rest, include_str!("trucks/isuzu_npr.toml"))?).map(drop)
         }
