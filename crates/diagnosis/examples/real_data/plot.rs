@@ -64,7 +64,8 @@ fn draw(svg: &mut String, panel: &Panel<'_>, top: f64) {
     put(format!("<text x='{LEFT}' y='{}' font-weight='bold'>{}</text>", top - 10.0, panel.title));
     for (lo, hi, vertical) in [(x0, x1, true), (y0, y1, false)] {
         let s = step(hi - lo, if vertical { 8.0 } else { 5.0 });
-        let mut v = (lo / s).ceil() * s;
+        // Adding zero turns a negative zero into zero.
+        let mut v = (lo / s).ceil() * s + 0.0;
         while v <= hi {
             let digits = (-s.log10().floor()).max(0.0) as usize;
             let (x, y) = (px(v), py(v));
