@@ -237,11 +237,6 @@ impl HorizonPlanner {
         self.clock.late_s()
     }
 
-    /// Forgets the last plan (after a jump, say).
-    pub fn forget(&mut self) {
-        self.last = None;
-    }
-
     /// Plans from the truck on. The last plan stays in place on failure.
     ///
     /// # Errors

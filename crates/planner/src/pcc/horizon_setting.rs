@@ -184,7 +184,6 @@ impl Setting {
             terminal: self.terminal,
             time,
             fence_s: None,
-            eco_roll: false,
             start_gear: None,
             cut: CutModel::Charged,
             forced_cut: Vec::new(),

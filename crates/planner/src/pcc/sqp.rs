@@ -39,8 +39,6 @@ pub struct Problem<'a> {
     pub time: TimeRule,
     /// Earliest time per node behind a vehicle ahead, s; `-∞` where it does not bind.
     pub fence_s: Option<Vec<f64>>,
-    /// Whether coasting phases may open the driveline.
-    pub eco_roll: bool,
     /// Gear engaged at the start.
     pub start_gear: Option<Drive>,
     /// How part load between fuel cut-off and zero wheel force is charged.

@@ -234,7 +234,6 @@ impl Trip {
             terminal: Terminal::Fixed(end_e),
             time: TimeRule::AtMost(trip_time_s),
             fence_s: None,
-            eco_roll: self.eco_roll,
             start_gear: None,
             cut: CutModel::Hull,
             forced_cut: Vec::new(),

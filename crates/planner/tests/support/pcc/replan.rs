@@ -72,7 +72,6 @@ impl Window {
             },
             time: TimeRule::Price(self.beta_g_s),
             fence_s: None,
-            eco_roll: false,
             start_gear: None,
             cut: CutModel::Hull,
             forced_cut: Vec::new(),
