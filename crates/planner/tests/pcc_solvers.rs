@@ -1,5 +1,7 @@
 //! The structured solver against Clarabel on identical subproblems.
 
+#![allow(clippy::disallowed_macros)]
+
 #[allow(dead_code)]
 #[path = "support/pcc/corpus.rs"]
 mod corpus;
@@ -59,37 +61,39 @@ fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
             let mut judge = |sub: &Subproblem, end: Terminal, time: TimeRule, _: Option<&[f64]>| {
                 seen += 1;
                 let oracle = clarabel_backend::solve(sub, end, time, None);
-                if seen > 3 {
+                if seen > 2 {
                     return oracle;
                 }
                 let price = TimeRule::Price(oracle.beta_g_s);
                 let reference = sub.e_max[sub.n].min(190.0);
-                let soft = Terminal::Soft { reference, pay: 3.0, credit: 2.0 };
-                for (end, time) in [(end, time), (end, price), (soft, price)] {
+                // Worth of energy at the end, with a narrow and a wide indifferent range.
+                let worth = 0.052 * mass / 1e3;
+                let soft = |pay, credit| Terminal::Soft { reference, pay, credit };
+                for (end, time) in [
+                    (end, time),
+                    (end, price),
+                    (soft(3.0, 2.0), price),
+                    (soft(1.15 * worth, 0.85 * worth), price),
+                ] {
+                    // Clarabel's own tolerance, 1e-8 of the cost, is too wide here: the cost is so
+                    // flat along some directions that 1e-8 of it are 1e-4 of an energy.
                     let oracle = clarabel_backend::solve_to(sub, end, time, None, 1e-10);
                     let mut own = Solution::default();
                     fast.solve_into(sub, end, time, &mut own);
-                    if oracle.status == SolveStatus::Solved {
-                        assert_eq!(
-                            own.status,
-                            SolveStatus::Solved,
-                            "{name} {mass} {time:?} {end:?}"
-                        );
-                        if let Terminal::Soft { .. } = end {
-                            // The best end energy is nearly indifferent: costs are compared.
-                            let (ours, theirs) =
-                                (cost(sub, end, time, &own), cost(sub, end, time, &oracle));
-                            assert!(
-                                ours <= theirs + 1e-6 * theirs.abs(),
-                                "{name} {mass}: {ours} g, Clarabel {theirs} g"
-                            );
-                        } else {
-                            let gap = own.e_j_kg.iter().zip(&oracle.e_j_kg);
-                            let gap = gap.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
-                            worst = worst.max(gap);
-                        }
-                        compared += 1;
+                    if oracle.status != SolveStatus::Solved {
+                        continue;
                     }
+                    assert_eq!(own.status, SolveStatus::Solved, "{name} {mass} {time:?} {end:?}");
+                    let (ours, theirs) =
+                        (cost(sub, end, time, &own), cost(sub, end, time, &oracle));
+                    assert!(
+                        ours <= theirs + 1e-8 * theirs.abs().max(100.0),
+                        "{name} {mass}: {ours} g, Clarabel {theirs} g"
+                    );
+                    let gap = own.e_j_kg.iter().zip(&oracle.e_j_kg);
+                    let gap = gap.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
+                    worst = worst.max(gap);
+                    compared += 1;
                 }
                 oracle
             };
@@ -98,4 +102,56 @@ fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
         }
     }
     assert!(compared > 100, "{compared}");
+}
+
+#[test]
+#[ignore = "campaign: cargo test --release -p planner --test pcc_solvers -- --ignored --nocapture"]
+fn campaign_the_difference_to_clarabel_shrinks_with_clarabels_tolerance() {
+    let tolerances = [1e-6, 1e-7, 1e-8, 1e-9, 1e-10];
+    let mut worst = [(0.0f64, 0.0f64); 5];
+    let mut fast = Structured::default();
+    for (_, profile) in corpus::roads() {
+        let limits = data_sheet::reference_limits();
+        let request = TripRequest {
+            profile: &profile,
+            truck: &limits,
+            band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
+            trip_time_s: None,
+            eco_roll: false,
+            tuning: Tuning::default(),
+        };
+        let trip = Trip::new(&request).unwrap();
+        let mut seen = 0;
+        let mut judge = |sub: &Subproblem, end: Terminal, time: TimeRule, _: Option<&[f64]>| {
+            let oracle = clarabel_backend::solve(sub, end, time, None);
+            seen += 1;
+            if seen > 2 {
+                return oracle;
+            }
+            let reference = sub.e_max[sub.n].min(190.0);
+            let (end, time) = (
+                Terminal::Soft { reference, pay: 3.0, credit: 2.0 },
+                TimeRule::Price(oracle.beta_g_s),
+            );
+            let mut own = Solution::default();
+            fast.solve_into(sub, end, time, &mut own);
+            for (worst, tolerance) in worst.iter_mut().zip(tolerances) {
+                let other = clarabel_backend::solve_to(sub, end, time, None, tolerance);
+                let gap = own.e_j_kg.iter().zip(&other.e_j_kg);
+                let gap = gap.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
+                worst.0 = worst.0.max(gap);
+                worst.1 = worst.1.max(cost(sub, end, time, &other) - cost(sub, end, time, &own));
+            }
+            oracle
+        };
+        trip.solve(trip.cruise.trip_time_s(), *trip.cruise.e_j_kg.last().unwrap(), &mut judge);
+    }
+    println!(
+        "| Clarabel's tolerance | largest energy difference, relative | Clarabel's cost above, g |"
+    );
+    println!("|---|---|---|");
+    for ((gap, dearer), tolerance) in worst.iter().zip(tolerances) {
+        println!("| {tolerance:.0e} | {gap:.1e} | {dearer:.1e} |");
+    }
+    assert!(worst[4].0 < 0.1 * worst[0].0, "{worst:?}");
 }

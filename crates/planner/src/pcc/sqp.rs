@@ -345,7 +345,7 @@ fn nearby_gears(gears: &[Drive], reach: usize) -> Vec<u32> {
 fn bounds(problem: &Problem<'_>, driven: &[f64], gears: &[Drive], sub: &mut Subproblem) {
     sub.e_max.copy_from_slice(&problem.e_max);
     for (low, (&bound, &e)) in sub.e_min.iter_mut().zip(problem.e_min.iter().zip(driven)) {
-        *low = bound.min(e * (1.0 - 1e-5));
+        *low = bound.min(e * (1.0 - 1e-4));
     }
     for (k, &drive) in gears.iter().enumerate() {
         let Drive::Gear(g) = drive else { continue };

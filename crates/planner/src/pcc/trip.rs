@@ -140,6 +140,9 @@ pub struct TripResult {
 /// a tube around the best so far.
 const TUBE_ROUNDS: usize = 2;
 
+/// Gain of a plan over cruise control, relative, below which cruise control is driven.
+const LEAST_GAIN: f64 = 1e-4;
+
 /// Overspeed of the second baseline, m/s.
 const OVERSPEED_M_S: f64 = 5.0 / 3.6;
 
@@ -334,7 +337,7 @@ impl Trip {
         for other in [&self.cruise, &self.overspeed] {
             if other.trip_time_s() <= trip_time_s * (1.0 + 1e-9)
                 && other.e_j_kg[other.e_j_kg.len() - 1] >= end_e - 1e-9
-                && other.total_fuel_g() <= driven.total_fuel_g() * (1.0 + 1e-6)
+                && other.total_fuel_g() <= driven.total_fuel_g() * (1.0 + LEAST_GAIN)
                 && self.violation(other) < 1e-6
             {
                 driven = other.clone();
