@@ -1,5 +1,6 @@
 //! Hides effects in generated drives and counts what the diagnosis makes of them:
-//! `campaign KIND COUNT SEED [drives=N] [without=channel,channel]`, KIND one of `clean`, `small`,
+//! `campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,channel]
+//! [only=cause] [from=CASE] [dump=DIR]`, KIND one of `clean`, `small`,
 //! `medium`, `large`, `pairs`, `outside`, `deleted`. One line per case, then the table.
 #![expect(
     clippy::disallowed_macros,
@@ -127,7 +128,7 @@ fn line(d: &Diagnosis) -> String {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let usage = "usage: campaign KIND COUNT SEED [drives=N] [without=channel,...] [only=cause] [from=CASE] [dump=DIR]";
+    let usage = "usage: campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [dump=DIR]";
     let kind = arguments.first().ok_or(usage)?.as_str();
     let count: usize = arguments.get(1).ok_or(usage)?.parse()?;
     let seed: u64 = arguments.get(2).ok_or(usage)?.parse()?;
@@ -136,10 +137,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if let Some(n) = option("drives=") {
         campaign.drives = n.parse()?;
     }
+    if let Some(s) = option("seconds=") {
+        campaign.duration_s = s.parse()?;
+    }
     let base = TruckParameters::load("reference")?;
     let plant = Plant::reference()?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let clean = generate(&base, &[], &Campaign::FULL, seed.wrapping_mul(7919) + 1)?;
+    let usual = Campaign { drives: 8, ..campaign };
+    let clean = generate(&base, &[], &usual, seed.wrapping_mul(7919) + 1)?;
     let mut t = Table::default();
     for case in 0..count {
         let draw = |m: Magnitude, k: usize, rng: &mut ChaCha8Rng| {

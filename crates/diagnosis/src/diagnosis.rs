@@ -23,7 +23,8 @@ pub enum Verdict {
     NothingToExplain,
     /// Something is wrong that no cause of the catalogue explains.
     Unknown,
-    /// Two causes explain the drives equally well.
+    /// Two causes explain the drives equally well, or the named ones leave so much unexplained that
+    /// they may stand in for another.
     Ambiguous,
 }
 
@@ -204,11 +205,15 @@ pub enum Progress {
 /// Part of the evidence of a named cause within which another counts as equally good, nats.
 const AMBIGUOUS_NATS: f64 = 3.0;
 /// Evidence that a free function needs beside or instead of named causes, nats.
-const UNKNOWN_EVIDENCE: f64 = 20.0;
+const UNKNOWN_EVIDENCE: f64 = 30.0;
 
 /// Part of the causes' evidence that a free function may add before the causes are not sure: a
 /// substitute for a cause that the catalogue lacks leaves more.
 const LEFT_OVER: f64 = 0.08;
+
+/// Variance over that of drives in order, in a module that a cause explains, above which the cause
+/// is not sure.
+const MISFIT: f64 = 1.2;
 
 /// Finds what the simulation of `plant` gets wrong on `drives` and names the cause.
 ///
@@ -383,7 +388,16 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
     }
     let left = rest.first().map_or(0.0, |s| s.log_z);
     if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
-        let sure = if fit.set.is_empty() { Sure::Outside } else { Sure::Not };
+        let module = rest.first().map(|s| s.module);
+        let shared = fit.set.iter().any(|h| {
+            let groups = CATALOGUE[*h].groups();
+            groups.iter().any(|g| module.is_some_and(|m| g.modules().contains(&m)))
+        });
+        let sure = match (fit.set.is_empty(), shared) {
+            (true, _) => Sure::Outside,
+            (false, true) => Sure::Not,
+            (false, false) => Sure::Yes,
+        };
         return (fit, describe(&rest), sure);
     }
     if let Some((module, excess, evidence)) = problem.restless(&fit.theta) {
@@ -406,7 +420,23 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
         }
         return (fit, Some(unknown), Sure::Yes);
     }
-    (fit, None, Sure::Yes)
+    let sure = if stands_in(problem, &fit) { Sure::Not } else { Sure::Yes };
+    (fit, None, sure)
+}
+
+/// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
+/// module, or a module that they explain keeps more variance than drives in order have.
+fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
+    let now = problem.settled(&fit.theta);
+    Module::ALL.into_iter().any(|m| {
+        let share = fit
+            .set
+            .iter()
+            .filter(|h| CATALOGUE[**h].groups().iter().any(|g| g.modules().contains(&m)))
+            .count();
+        let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
+        share >= 3 || (share > 0 && excess > MISFIT)
+    })
 }
 
 /// How sure a set of named causes is against what the catalogue does not have.

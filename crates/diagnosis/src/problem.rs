@@ -421,6 +421,13 @@ impl<'a> Problem<'a> {
         (Gram { per_drive: parts.into_iter().map(|p| p.0).collect() }, chi)
     }
 
+    /// Squared whitened residuals per module at the reference.
+    pub(crate) fn chi_at_reference(&self) -> [f64; MODULES] {
+        core::array::from_fn(|m| {
+            self.nuisance.iter().map(|n| inner(&n.whitened[m], &n.whitened[m])).sum()
+        })
+    }
+
     /// Residuals of a drive at `theta`, raw and whitened; only groups whose parameters differ
     /// from the reference are replayed.
     fn at(&self, i: usize, theta: &Theta) -> (Residuals, Column) {

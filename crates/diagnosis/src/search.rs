@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::hypothesis::{CATALOGUE, Hypothesis, Start};
 use crate::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, Problem};
+use crate::replay::MODULES;
 use crate::stats::evidence;
 
 /// Least evidence for another cause, nats.
@@ -38,6 +39,8 @@ pub(crate) struct Fit {
     pub(crate) gram: Gram,
     /// Residual norm at the fit.
     pub(crate) norm: f64,
+    /// Half the fall of the squared residual per module, nats.
+    pub(crate) explained: [f64; MODULES],
 }
 
 /// A hypothesis that was tried for the next place.
@@ -77,7 +80,7 @@ impl Problem<'_> {
                 .sum::<f64>()
         };
         let mut theta = *start;
-        let (mut gram, _) = self.gram(&theta, &directions(&free, &theta));
+        let (mut gram, mut chi) = self.gram(&theta, &directions(&free, &theta));
         let mut best = cost(gram.sum(|_| true).2, &theta);
         for _ in 0..8 {
             if free.is_empty() {
@@ -102,7 +105,7 @@ impl Problem<'_> {
                 if c < best {
                     improved = best - c;
                     (theta, best) = (t, c);
-                    gram = self.gram(&theta, &directions(&free, &theta)).0;
+                    (gram, chi) = self.gram(&theta, &directions(&free, &theta));
                     break;
                 }
                 factor *= 0.35;
@@ -121,7 +124,9 @@ impl Problem<'_> {
         let inverse = chol.inverse();
         let covariance = DMatrix::from_fn(k, k, |i, j| sigma[i] * inverse[(i, j)] * sigma[j]);
         let log_z = 0.5 * (zero_norm - best) - 0.5 * log_det;
-        Some(Fit { set: set.to_vec(), theta, log_z, free, covariance, gram, norm })
+        let zero = self.chi_at_reference();
+        let explained = core::array::from_fn(|m| 0.5 * (zero[m] - chi[m]));
+        Some(Fit { set: set.to_vec(), theta, log_z, free, covariance, gram, norm, explained })
     }
 
     /// Variances of the free parameters, widened by what the drives disagree about.
@@ -260,10 +265,13 @@ impl Problem<'_> {
         let Some(added) = next.set.iter().find(|h| !best.set.contains(h)) else {
             return f64::INFINITY;
         };
-        let groups = CATALOGUE[*added].groups();
-        let shares =
-            best.set.iter().any(|h| CATALOGUE[*h].groups().iter().any(|g| groups.contains(g)));
-        let relative = if shares { RELATIVE_EVIDENCE * best.log_z } else { 0.0 };
+        let there: f64 = CATALOGUE[*added]
+            .groups()
+            .iter()
+            .flat_map(|g| g.modules())
+            .map(|m| best.explained[*m as usize].max(0.0))
+            .sum();
+        let relative = if best.set.is_empty() { 0.0 } else { RELATIVE_EVIDENCE * there };
         MIN_EVIDENCE.max(relative)
     }
 

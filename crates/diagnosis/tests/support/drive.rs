@@ -107,6 +107,7 @@ pub(crate) fn drive(
     let (mut held_pedal, mut foot, mut slowing) = (0.0, 0.0, 0.0);
     let (mut swing_goal, mut swing) = (0.0, 0.0);
     let (mut last_vy, mut target) = (0.0, 10.0);
+    let mut altitude = road.altitude(0.0);
     let air_k = setting.air_degc + 273.15;
     for i in 0..samples * 5 {
         let time_s = i as f64 * STEP_S;
@@ -152,7 +153,7 @@ pub(crate) fn drive(
             xbr,
             coolant_degc: s.coolant_k - 273.15,
             ambient_degc: setting.air_degc,
-            altitude_m: road.altitude(place),
+            altitude_m: altitude,
             curvature: road.curvature(place),
             pressure_kpa: models[0].mean_pressure_pa(&s) * 1e-3,
             mass_kg: models[0].mass_kg(),
@@ -162,6 +163,7 @@ pub(crate) fn drive(
         let a = effects::act(hidden, &mut memory, &now, rng, STEP_S);
         let pressure_pa = 101_325.0 * (-now.altitude_m / 8434.0).exp();
         let grade = road.grade(place) + instruments.grade_bias_frac;
+        altitude += STEP_S * v * grade / (1.0 + grade * grade).sqrt();
         let force = a.force_n / (now.mass_kg * GRAVITY_M_S2);
         let side = a.side_n / (now.mass_kg * GRAVITY_M_S2);
         let patch = RoadPatch {
