@@ -11,6 +11,7 @@ mod diagnosis;
 mod drive;
 mod error;
 mod executor;
+pub mod fidelity;
 mod finding;
 pub mod fit;
 mod gain;

@@ -27,6 +27,8 @@ pub(crate) enum Command {
     /// Checks road maps.
     #[command(subcommand)]
     Map(cmd::map::Command),
+    /// Drives the truck model with measured inputs and says how well it fits.
+    Replay(cmd::replay::Args),
     /// Makes a whole recording of one torn by a crash.
     Recover(cmd::recover::Args),
     /// Lists and shows the built-in scenarios.

@@ -120,3 +120,24 @@ fn the_example_finds_what_it_hid_and_its_truck_drives() {
     }
     assert!(!page.contains("src=\"http"), "and needs nothing else");
 }
+
+#[test]
+fn a_recording_is_reproduced_in_open_loop_and_the_accuracy_is_defined() {
+    let folder = tempfile::tempdir().unwrap();
+    let drives = runs(&folder.path().join("runs"), &["20000"]);
+    let out = text(&folder.path().join("out"));
+    let given = ["replay", "--truck", "reference", "--drives", &drives, "--out", &out, "--json"];
+    let fidelity = diagnosed(&given);
+    assert!(fidelity["accuracy_is"].as_str().unwrap().starts_with("1 - mean |"));
+    let speed = |horizon: serde_json::Value| {
+        let all = fidelity["overall"].as_array().unwrap();
+        let is = |s: &&serde_json::Value| s["quantity"] == "speed_m_s" && s["horizon_s"] == horizon;
+        all.iter().find(is).unwrap()["accuracy_frac"].as_f64().unwrap()
+    };
+    assert!(speed(serde_json::json!(60.0)) > 0.97, "{fidelity}");
+    assert!(speed(serde_json::Value::Null) > 0.9, "{fidelity}");
+    assert!(folder.path().join("out/replay.html").is_file());
+    let missing = text(&folder.path().join("none"));
+    let refused = refused(&["replay", "--truck", "reference", "--drives", &missing, "--out", &out]);
+    assert!(refused.contains("none"), "{refused}");
+}

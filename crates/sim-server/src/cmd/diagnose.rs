@@ -19,7 +19,7 @@ mod results;
 mod threads;
 
 use results::Results;
-use threads::Threads;
+pub(crate) use threads::Threads;
 
 /// Finds what the simulation gets wrong on measured drives and names the cause. Writes
 /// diagnosis.json, report.html and the extended truck file.
@@ -109,7 +109,12 @@ fn named(path: &Path) -> String {
 
 /// Measured drives: a folder as the contract has it, or recordings of this program, from which
 /// such a folder is made at `made`.
-fn read(path: &Path, truck: &TruckParameters, made: &Path, seed: u64) -> Result<DriveSet, Failure> {
+pub(crate) fn read(
+    path: &Path,
+    truck: &TruckParameters,
+    made: &Path,
+    seed: u64,
+) -> Result<DriveSet, Failure> {
     let folder = if path.join("drives.toml").is_file() {
         path
     } else {
@@ -129,7 +134,7 @@ fn read(path: &Path, truck: &TruckParameters, made: &Path, seed: u64) -> Result<
 }
 
 /// Writes a file of the results.
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
+pub(crate) fn write(path: &Path, text: &str) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| Failure::file(path, e))
 }
 

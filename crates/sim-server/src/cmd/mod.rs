@@ -4,6 +4,7 @@ pub(crate) mod diagnose;
 pub(crate) mod map;
 pub(crate) mod plan;
 pub(crate) mod recover;
+pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod scenario;
 pub(crate) mod traffic;
@@ -22,6 +23,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Diagnose(args)) => diagnose::run(&args),
         Some(Command::Traffic(args)) => traffic::run(&args),
         Some(Command::Map(command)) => map::run(command),
+        Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Recover(args)) => recover::run(&args),
         Some(Command::Scenario(command)) => scenario::run(&command),
     }

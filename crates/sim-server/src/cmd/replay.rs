@@ -1,0 +1,170 @@
+//! `replay`: measured inputs through the whole truck model, open loop, and how well it fits.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use clap::Parser;
+use diagnosis::Executor;
+use diagnosis::fidelity::{DriveFidelity, Replayed, SignalFidelity, fidelity};
+use dynamics::TruckParameters;
+use serde::Serialize;
+
+use super::diagnose::{Threads, read, write};
+use crate::failure::Failure;
+use crate::output;
+use crate::picture::{Line, Strip, Style, page};
+use crate::progress::Stages;
+use crate::provenance::Provenance;
+
+/// Drives the truck model with the measured inputs and compares its outputs with the measured
+/// ones. Writes fidelity.json and a picture, replay.html.
+#[derive(Debug, Parser)]
+pub(crate) struct Args {
+    /// A truck file, or a built-in name.
+    #[arg(long, value_name = "T")]
+    truck: String,
+    /// Folder of measured drives, or recordings of this program.
+    #[arg(long, value_name = "DIR")]
+    drives: PathBuf,
+    /// Folder of the results.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Prints fidelity.json on stdout instead of sentences.
+    #[arg(long)]
+    json: bool,
+}
+
+/// `fidelity.json`.
+#[derive(Debug, Serialize)]
+struct FidelityJson<'a> {
+    #[serde(flatten)]
+    provenance: Provenance,
+    truck: &'a str,
+    accuracy_is: &'static str,
+    /// Over all drives, weighted by samples.
+    overall: Vec<SignalFidelity>,
+    drives: &'a [DriveFidelity],
+}
+
+/// Runs the command.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let truck = TruckParameters::load(&args.truck).map_err(Failure::input)?;
+    let set = read(&args.drives, &truck, &args.out.join("drives"), 1)?;
+    let stages = Stages::start();
+    stages.show("replaying the drives");
+    let slots: Vec<Mutex<Option<Result<DriveFidelity, Failure>>>> =
+        set.drives.iter().map(|_| Mutex::new(None)).collect();
+    Threads::available().run(slots.len(), &|i| {
+        let one = fidelity(&truck, &set.drives[i]).map_err(Failure::input);
+        if let Ok(mut slot) = slots[i].lock() {
+            *slot = Some(one);
+        }
+    });
+    stages.finish();
+    let mut drives = Vec::with_capacity(slots.len());
+    for slot in slots {
+        let one = slot.into_inner().ok().flatten();
+        drives.push(one.unwrap_or_else(|| Err(Failure::Work("a drive was lost".into())))?);
+    }
+    let overall = overall(&drives);
+    let text = sentence(&overall);
+    let json = FidelityJson {
+        provenance: Provenance::of_seed(0),
+        truck: &truck.name,
+        accuracy_is: "1 - mean |simulated - measured| / mean |measured|",
+        overall,
+        drives: &drives,
+    };
+    let json = serde_json::to_string_pretty(&json).map_err(Failure::work)?;
+    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
+    write(&args.out.join("fidelity.json"), &json)?;
+    let title = format!("{} in open loop on measured inputs", truck.name);
+    let picture = page(&title, &text, "time, min (drives one after the other)", &strips(&drives));
+    write(&args.out.join("replay.html"), &picture)?;
+    output::result(if args.json { &json } else { &text });
+    Ok(())
+}
+
+/// The same signal and horizon of all drives together.
+fn overall(drives: &[DriveFidelity]) -> Vec<SignalFidelity> {
+    let mut out: Vec<SignalFidelity> = Vec::new();
+    for s in drives.iter().flat_map(|d| &d.signals) {
+        let same = |o: &&mut SignalFidelity| o.quantity == s.quantity && o.horizon_s == s.horizon_s;
+        let Some(o) = out.iter_mut().find(same) else {
+            out.push(*s);
+            continue;
+        };
+        let (a, b) = (o.samples as f64, s.samples as f64);
+        let mean = |x: f64, y: f64| (a * x + b * y) / (a + b);
+        o.mean_abs_error = mean(o.mean_abs_error, s.mean_abs_error);
+        o.mean_abs = mean(o.mean_abs, s.mean_abs);
+        o.rmse = mean(o.rmse * o.rmse, s.rmse * s.rmse).sqrt();
+        o.samples += s.samples;
+        o.accuracy_frac = (o.mean_abs > 1e-9).then(|| 1.0 - o.mean_abs_error / o.mean_abs);
+    }
+    out
+}
+
+fn sentence(overall: &[SignalFidelity]) -> String {
+    let percent = |s: &SignalFidelity| {
+        s.accuracy_frac.map_or_else(|| "–".to_owned(), |a| format!("{:.1} %", 100.0 * a))
+    };
+    let mut names: Vec<&str> = Vec::new();
+    for s in overall {
+        if !names.contains(&s.quantity) {
+            names.push(s.quantity);
+        }
+    }
+    let mut lines = vec!["Accuracy (1 - mean |error| / mean |measured|) of free runs:".to_owned()];
+    for name in names {
+        let of = overall.iter().filter(|s| s.quantity == name);
+        let cells: Vec<String> = of
+            .map(|s| match s.horizon_s {
+                Some(h) => format!("{h} s {}", percent(s)),
+                None => format!("whole drive {}", percent(s)),
+            })
+            .collect();
+        lines.push(format!("  {name}: {}", cells.join(", ")));
+    }
+    lines.join("\n")
+}
+
+/// Samples per point of the picture: one a second.
+const THIN: usize = 20;
+
+/// A strip of the picture: title, quantity, factor.
+const STRIPS: [(&str, &str, f64); 6] = [
+    ("speed, km/h", "speed_m_s", 3.6),
+    ("engine speed, rpm", "engine_speed_rpm", 1.0),
+    ("engine torque, %", "engine_torque_percent", 1.0),
+    ("gear", "gear", 1.0),
+    ("brake pressure, kPa", "brake_pressure_kpa", 1.0),
+    ("yaw rate, rad/s", "yaw_rate_rad_s", 1.0),
+];
+/// A way to see a signal: name, color, values.
+type View = (&'static str, &'static str, fn(&Replayed) -> &[f64]);
+const VIEWS: [View; 3] = [
+    ("measured", "#17202a", |r| &r.measured),
+    ("free runs of 60 s", "#0a7cc4", |r| &r.free_runs),
+    ("whole drive in open loop", "#d1495b", |r| &r.open_loop),
+];
+
+fn strips(drives: &[DriveFidelity]) -> Vec<Strip> {
+    let minutes_per_point = THIN as f64 * diagnosis::Drive::STEP_S / 60.0;
+    let strip = |(title, quantity, factor): &(&'static str, &str, f64)| {
+        let lines = VIEWS.iter().map(|(name, color, values)| {
+            let mut y = Vec::new();
+            for drive in drives {
+                if let Some(r) = drive.replayed.iter().find(|r| r.quantity == *quantity) {
+                    y.extend(values(r).iter().step_by(THIN).map(|v| factor * v));
+                }
+                y.push(f64::NAN);
+            }
+            let x = (0..y.len()).map(|i| i as f64 * minutes_per_point).collect();
+            Line { name: (*name).to_owned(), x, y, color, style: Style::Solid }
+        });
+        let lines: Vec<Line> = lines.filter(|l| l.y.iter().any(|v| v.is_finite())).collect();
+        (!lines.is_empty()).then_some(Strip { title, lines })
+    };
+    STRIPS.iter().filter_map(strip).collect()
+}
