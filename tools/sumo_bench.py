@@ -5,24 +5,35 @@ The binary is the example `traci_cost` of the crate traffic-client. Needs `eclip
 in this Python. Rust and libsumo rounds alternate; the table shows the least time per step of each
 case (the machine may be shared) and ratios to SUMO's own step.
 """
+
+import itertools
 import json
+import math
 import multiprocessing as mp
 import os
 import subprocess
 import sys
 import tempfile
 import time
+import xml.etree.ElementTree as xml
+from multiprocessing.queues import Queue
 
 WARM_UP, STEPS = 100, 300
 VARIABLES = [0x42, 0x40, 0x43, 0x72, 0x32]
 
+Pose = tuple[float, float, float]
 
-def libsumo_round(folder, full, shape, queue):
+
+def libsumo_round(
+    folder: str, full: bool, shape: list[Pose], queue: "Queue[float]"
+) -> None:
     import libsumo
 
     options = ["sumo", "-n", f"{folder}/road.net.xml", "-r", f"{folder}/bench.rou.xml"]
-    options += "--step-length 0.1 --seed 1 --thread-rngs 64 --no-step-log --duration-log.disable".split()
-    options += "--no-warnings --xml-validation never --time-to-teleport -1 --collision.action none".split()
+    options += ["--step-length", "0.1", "--seed", "1", "--thread-rngs", "64"]
+    options += ["--no-step-log", "--duration-log.disable", "--no-warnings"]
+    options += ["--xml-validation", "never", "--time-to-teleport", "-1"]
+    options += ["--collision.action", "none"]
     options += ["--lanechange.duration", "3"]
     libsumo.start(options)
     if full:
@@ -42,20 +53,29 @@ def libsumo_round(folder, full, shape, queue):
     libsumo.close()
 
 
-def ego_path(folder):
-    """The right lane from 3 km on at 20 m/s, as (x, y, angle), from SUMO's own lane shapes."""
-    import math
-    import xml.etree.ElementTree as xml
+def child(element: xml.Element, name: str) -> xml.Element:
+    found = element.find(name)
+    if found is None:
+        raise ValueError(f"no {name} in {element.tag}")
+    return found
 
-    edges = {e.get("id"): e for e in xml.parse(f"{folder}/road.net.xml").getroot().iter("edge")}
-    route = xml.parse(f"{folder}/bench.rou.xml").getroot().find("route").get("edges").split()
-    points = []
+
+def ego_path(folder: str) -> list[Pose]:
+    """The right lane from 3 km on at 20 m/s, as (x, y, angle), from SUMO's own lane shapes."""
+    net = xml.parse(f"{folder}/road.net.xml").getroot()
+    edges = {e.get("id"): e for e in net.iter("edge")}
+    routes = xml.parse(f"{folder}/bench.rou.xml").getroot()
+    route = child(routes, "route").attrib["edges"].split()
+    points: list[tuple[float, float]] = []
     for edge in route:
         lanes = edges[edge].findall("lane")
-        lane = next(l for l in lanes if l.find("param").get("value") == "0")
-        points += [tuple(map(float, p.split(",")[:2])) for p in lane.get("shape").split()]
-    path, at, wanted = [], 0.0, 3000.0
-    for (x0, y0), (x1, y1) in zip(points, points[1:]):
+        right = next(x for x in lanes if child(x, "param").get("value") == "0")
+        for point in right.attrib["shape"].split():
+            x, y = point.split(",")[:2]
+            points.append((float(x), float(y)))
+    path: list[Pose] = []
+    at, wanted = 0.0, 3000.0
+    for (x0, y0), (x1, y1) in itertools.pairwise(points):
         length = math.hypot(x1 - x0, y1 - y0)
         while length > 0 and at + length >= wanted and len(path) <= WARM_UP + STEPS:
             f = (wanted - at) / length
@@ -66,36 +86,53 @@ def ego_path(folder):
     return path
 
 
-def main():
+def main() -> None:
     binary = sys.argv[1]
     rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
     import sumo
 
-    environment = dict(os.environ, SUMO_BINARY=os.path.join(sumo.SUMO_HOME, "bin", "sumo"))
+    sumo_binary = os.path.join(sumo.SUMO_HOME, "bin", "sumo")
+    environment = dict(os.environ, SUMO_BINARY=sumo_binary)
     os.environ["SUMO_HOME"] = sumo.SUMO_HOME
-    print("| vehicles | SUMO alone | step | + context | + moved ego | ratio | libsumo step | libsumo full | Rust / libsumo | native | SUMO / native |")
+    print(
+        "| vehicles | SUMO alone | step | + context | + moved ego | ratio "
+        "| libsumo step | libsumo full | Rust / libsumo | native | SUMO / native |"
+    )
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for vehicles in (50, 200, 1000):
-        best = {}
+        best: dict[str, float] = {}
         with tempfile.TemporaryDirectory() as folder:
             for _ in range(rounds):
-                out = subprocess.run([binary, folder, str(vehicles)], env=environment, check=True, capture_output=True, text=True)
-                result = json.loads(out.stdout)
+                out = subprocess.run(
+                    [binary, folder, str(vehicles)],
+                    env=environment,
+                    check=True,
+                    capture_output=True,
+                    text=True,
+                )
+                result: dict[str, float] = json.loads(out.stdout)
                 path = ego_path(folder)
-                for name, full in (("libsumo_step_us", False), ("libsumo_full_us", True)):
-                    queue = mp.Queue()
-                    worker = mp.Process(target=libsumo_round, args=(folder, full, path, queue))
+                for name, full in (
+                    ("libsumo_step_us", False),
+                    ("libsumo_full_us", True),
+                ):
+                    queue: Queue[float] = mp.Queue()
+                    worker = mp.Process(
+                        target=libsumo_round, args=(folder, full, path, queue)
+                    )
                     worker.start()
                     result[name] = queue.get(timeout=120)
                     worker.join()
                 for name, value in result.items():
                     best[name] = min(best.get(name, value), value)
-        full = best["ego_and_context_us"]
+        moved = best["ego_and_context_us"]
         native = best["native_us"] * vehicles / max(best["native_vehicles"], 1)
         print(
-            f"| {vehicles} | {best['floor_us']:.0f} | {best['step_us']:.0f} | {best['context_us']:.0f} | {full:.0f} "
-            f"| {full / best['floor_us']:.2f} | {best['libsumo_step_us']:.0f} | {best['libsumo_full_us']:.0f} "
-            f"| {full / best['libsumo_full_us']:.2f} | {native:.1f} | {best['floor_us'] / native:.0f} |",
+            f"| {vehicles} | {best['floor_us']:.0f} | {best['step_us']:.0f} "
+            f"| {best['context_us']:.0f} | {moved:.0f} | {moved / best['floor_us']:.2f} "
+            f"| {best['libsumo_step_us']:.0f} | {best['libsumo_full_us']:.0f} "
+            f"| {moved / best['libsumo_full_us']:.2f} | {native:.1f} "
+            f"| {best['floor_us'] / native:.0f} |",
             flush=True,
         )
 
