@@ -26,9 +26,9 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
             if x >= 0.0 { "low" } else { "high" }
         ),
         "map_shift" => format!(
-            "The map is {:.0} m {} of the road.",
+            "The map is {:.0} m {} the road.",
             x.abs(),
-            if x >= 0.0 { "behind" } else { "ahead" }
+            if x >= 0.0 { "ahead of" } else { "behind" }
         ),
         "tyre_warmup" => format!("Cold tyres roll {percent} % harder at the start and warm up."),
         "driveline_loss" => format!(
