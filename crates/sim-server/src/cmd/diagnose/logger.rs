@@ -55,7 +55,7 @@ const SENSORS: [(&str, f64, f64); 18] = [
     ("engine_speed_rpm", 1.5, 0.125),
     ("engine_brake_frac", 0.0, 0.004),
     ("xbr_decel_m_s2", 0.0, 1.0 / 2048.0),
-    ("brake_pressure_kpa", 2.0, 0.5),
+    ("brake_pressure_kpa", 0.0, 4.0),
     ("steering_wheel_rad", 0.0, 1.0 / 1024.0),
     ("yaw_rate_rad_s", 8e-4, 1.0 / 8192.0),
     ("trailer_yaw_rate_rad_s", 8e-4, 1.0 / 8192.0),
