@@ -30,7 +30,7 @@ fn drive(truck: TruckParameters) -> Vec<EgoState> {
     let instruments = model.parameters().instruments;
     let mut s = model.initial_state(0.0, 0.0, 0.0, 18.0);
     let mut out = Vec::new();
-    for k in 0..800 {
+    for k in 0..1_300 {
         let t = 0.5 * f64::from(k);
         let at_m = instruments.map_position_m(s.distance_m);
         let patch = RoadPatch {
@@ -150,7 +150,8 @@ fn no_parameter_is_dead() {
         for (i, p) in c.shapes.iter().enumerate() {
             let mut shaped = sizes.clone();
             shaped.resize(sizes.len() + i, 0.0);
-            shaped.push(-p.prior_sigma);
+            let down = -p.prior_sigma;
+            shaped.push(if down >= p.bounds[0] { down } else { p.prior_sigma });
             let d = difference(&with, &drive(extended(c, &shaped)));
             assert!(d > 1.0, "{} {}: {d}", c.id, p.path);
         }
