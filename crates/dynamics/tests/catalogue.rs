@@ -30,7 +30,7 @@ fn drive(truck: TruckParameters) -> Vec<EgoState> {
     let instruments = model.parameters().instruments;
     let mut s = model.initial_state(0.0, 0.0, 0.0, 18.0);
     let mut out = Vec::new();
-    for k in 0..1_300 {
+    for k in 0..2_000 {
         let t = 0.5 * f64::from(k);
         let at_m = instruments.map_position_m(s.distance_m);
         let patch = RoadPatch {
