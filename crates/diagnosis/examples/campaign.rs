@@ -1,7 +1,8 @@
 //! Hides effects in generated drives and counts what the diagnosis makes of them:
-//! `campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,channel]
-//! [only=cause] [from=CASE] [dump=DIR]`, KIND one of `clean`, `small`,
-//! `medium`, `large`, `pairs`, `outside`, `deleted`. One line per case, then the table.
+//! `campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,channel] [only=cause]
+//! [from=CASE] [to=CASE] [dump=DIR]`, KIND one of `clean`, `small`, `medium`, `large`, `pairs`,
+//! `outside`, `deleted`. One line per case (`.` exact, `+` first right, `-` nothing, `X` wrong),
+//! then the table.
 #![expect(
     clippy::disallowed_macros,
     clippy::disallowed_methods,
@@ -15,12 +16,14 @@ mod support;
 use std::path::Path;
 
 use diagnosis::{Channel, Diagnosis, Drive, DriveSet, Options, Plant, Serial, Verdict, diagnose};
-use dynamics::TruckParameters;
-use dynamics::catalogue::CATALOGUE;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use support::effects::{Effect, OUTSIDE};
-use support::{Campaign, Magnitude, generate, hide};
+use support::effects::{Effect, Magnitude, SIZES, Shape, hide};
+use support::outside::OUTSIDE;
+use support::random::{between, sign};
+use support::{Campaign, generate};
+
+const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [dump=DIR]";
 
 #[derive(Default)]
 struct Table {
@@ -36,39 +39,37 @@ struct Table {
     unsure: usize,
     intervals: usize,
     covered: usize,
+    gains: usize,
     worse: usize,
     seconds: Vec<f64>,
     kept: Vec<f64>,
 }
 
-/// Key and value in `diagnosis.json` of a size in the catalogue's unit; `None` where the hidden
-/// shape has another parameter than the catalogue's.
+/// Key and value in `diagnosis.json` of a hidden size; `None` where the hidden shape has another
+/// parameter than the catalogue's.
 fn expected(id: &str, size: f64) -> Option<(&'static str, f64)> {
     Some(match id {
         "rolling_resistance" => ("coefficient_scale", 1.0 + size),
         "air_drag" => ("cd_a_scale", 1.0 + size),
         "headwind" => ("headwind_m_s", size),
         "mass" => ("mass_scale", 1.0 + size),
-        "grade_bias" => ("grade_frac", size),
+        // The map's error; the diagnosis states what the map must be corrected by.
+        "grade_bias" => ("grade_frac", -size),
         "map_shift" => ("shift_m", -size),
         "tyre_warmup" => ("cold_extra_frac", size),
-        "driveline_loss" => ("extra_loss_frac", size * 0.0494 / 0.9506),
-        "fan_load" => ("fan_power_kw", size * 1e-3),
+        "driveline_loss" => ("extra_loss_frac", size),
+        "fan_load" => ("fan_power_kw", size),
         "dragging_brake" => ("force_n", size),
         "engine_friction" => ("friction_scale", 1.0 + size),
-        "altitude_derate" => ("torque_loss_per_km", size * 1e3),
-        "turbo_lag" => ("lag_s", size * 0.45),
+        "turbo_lag" | "steering_lag" => ("lag_s", size),
         "pedal_delay" | "brake_delay" => ("delay_s", size),
         "shift_duration" => ("extra_time_s", size),
-        "fuel_map_low_load" => ("extra_frac", size),
         "brake_gain" => ("gain_scale", 1.0 + size),
-        "brake_fade" => ("loss_per_100_k", size * 1e2),
         "speed_scale" => ("scale", 1.0 + size),
         "yaw_rate_bias" => ("bias_rad_s", size),
         "steering_ratio" => ("ratio_scale", 1.0 + size),
         "steering_offset" => ("offset_rad", size),
         "steering_free_play" => ("free_play_rad", size),
-        "steering_lag" => ("lag_s", size),
         "cornering_stiffness_front"
         | "cornering_stiffness_drive"
         | "cornering_stiffness_trailer" => ("stiffness_scale", 1.0 + size),
@@ -117,68 +118,175 @@ fn line(d: &Diagnosis) -> String {
                 .map(|(k, p)| format!("{k}={:.4}±{:.4}", p.value, p.sigma))
                 .collect();
             let or: Vec<&str> = c.confused_with.iter().map(|x| x.id).collect();
-            format!("{}[{}] {:.0} nats or {or:?}", c.id, p.join(" "), c.evidence)
+            let or = if or.is_empty() { String::new() } else { format!(" or {or:?}") };
+            format!("{}[{}] {:.0} nats{or}", c.id, p.join(" "), c.evidence)
         })
         .collect();
     let unknown = d.unknown.as_ref().map_or(String::new(), |u| {
         format!(" unknown: {} by {:?} {:.0} nats", u.quantity, u.signals, u.evidence)
     });
-    format!("{:?} {}{unknown}", d.verdict, causes.join(" + "))
+    let not: Vec<&str> = d.not_observable.iter().map(|n| n.id).collect();
+    let not = if not.is_empty() { String::new() } else { format!(" not observable {not:?}") };
+    format!("{:?} {}{unknown}{not}", d.verdict, causes.join(" + "))
+}
+
+/// What is hidden in a case of a kind.
+fn draw(kind: &str, case: usize, only: Option<&str>, rng: &mut ChaCha8Rng) -> Option<Vec<Effect>> {
+    let single = |m: Magnitude, rng: &mut ChaCha8Rng| {
+        let id = only.unwrap_or(SIZES[case % SIZES.len()].0);
+        hide(id, m, rng).map(|e| vec![e])
+    };
+    match kind {
+        "clean" => Some(Vec::new()),
+        "small" => single(Magnitude::Small, rng),
+        "medium" | "deleted" => single(Magnitude::Medium, rng),
+        "large" => single(Magnitude::Large, rng),
+        "pairs" => {
+            let n = SIZES.len();
+            let a = rng.random_range(0..n);
+            let b = (a + rng.random_range(1..n)) % n;
+            let mut either = |i: usize| {
+                let m = if rng.random::<bool>() { Magnitude::Medium } else { Magnitude::Large };
+                hide(SIZES[i].0, m, rng)
+            };
+            Some([either(a)?, either(b)?].into())
+        }
+        "outside" => {
+            let o = &OUTSIDE[case % OUTSIDE.len()];
+            let positive = o.1 > 1.0 || o.2 == "shift_in_process" || o.1 == 0.5;
+            let sign = if positive { 1.0 } else { sign(rng) };
+            let size = sign * o.1 * between(rng, 0.7, 1.3);
+            Some(vec![Effect::Outside { kind: o.0, size, shape: Shape::draw(rng) }])
+        }
+        _ => None,
+    }
+}
+
+impl Table {
+    /// Counts a case; returns its mark and how far the sizes are off.
+    fn count(&mut self, hidden: &[Effect], d: &Diagnosis, deleted: bool) -> (char, String) {
+        let truth: Vec<&str> = hidden
+            .iter()
+            .filter_map(|e| if let Effect::Cause { id, .. } = e { Some(*id) } else { None })
+            .collect();
+        let named: Vec<&str> = d.causes.iter().map(|c| c.id).collect();
+        let observable = |id: &&&str| !d.not_observable.iter().any(|n| n.id == **id);
+        let visible: Vec<&&str> = truth.iter().filter(observable).collect();
+        self.cases += 1;
+        let hit = visible.iter().filter(|id| named.contains(**id)).count();
+        let unseen = visible.is_empty() && named.is_empty();
+        let first = named.first().is_some_and(|n| truth.contains(n)) || unseen;
+        let all = hit == visible.len();
+        let exact = all && named.len() == visible.len() && d.verdict != Verdict::Unknown;
+        self.first += usize::from(first);
+        self.all += usize::from(all);
+        self.any += usize::from(hit > 0 || unseen);
+        self.exact += usize::from(exact);
+        self.silent += usize::from(d.verdict == Verdict::NothingToExplain);
+        self.wrong += usize::from(
+            d.verdict == Verdict::Explained && named.first().is_some_and(|n| !truth.contains(n)),
+        );
+        self.unknown += usize::from(d.verdict == Verdict::Unknown);
+        self.unsure += usize::from(d.verdict != Verdict::Explained);
+        let mut right = false;
+        if let Some(Effect::Outside { kind, .. }) = hidden.first()
+            && let (Some(o), Some(u)) = (OUTSIDE.iter().find(|o| o.0 == *kind), &d.unknown)
+        {
+            right =
+                u.signals.first().is_some_and(|s| o.3.contains(s)) && d.verdict == Verdict::Unknown;
+            self.signal += usize::from(right);
+        }
+        let mut off = String::new();
+        for e in hidden {
+            if let Effect::Cause { id, size, .. } = e
+                && let Some(c) = d.causes.iter().find(|c| c.id == *id)
+                && let Some((key, value)) = expected(id, *size)
+                && let Some(p) = c.parameters.get(key)
+            {
+                let z = (p.value - value) / p.sigma;
+                self.intervals += 1;
+                self.covered += usize::from(z.abs() <= 1.645);
+                off += &format!(" z={z:.1}");
+            }
+        }
+        if let Some(g) = &d.gain {
+            self.gains += 1;
+            self.worse += usize::from(g.log_score_nats < 0.0);
+            let (b, a) = (g.speed_rmse_m_s.before, g.speed_rmse_m_s.after);
+            let floor = d.wrong.first().map_or(0.0, |w| w.noise_floor);
+            if b > 1.5 * floor && !deleted {
+                self.kept.push((b - a) / (b - floor));
+            }
+        }
+        let mark = match () {
+            () if deleted || truth.is_empty() && !hidden.is_empty() => {
+                if right || deleted && d.verdict != Verdict::Explained { '.' } else { 'X' }
+            }
+            () if exact => '.',
+            () if first => '+',
+            () if named.is_empty() => '-',
+            () => 'X',
+        };
+        (mark, off)
+    }
+
+    fn print(&mut self, kind: &str, seed: u64) {
+        let of = |n: usize| {
+            format!("{n}/{} ({:.1} %)", self.cases, 100.0 * n as f64 / self.cases.max(1) as f64)
+        };
+        self.seconds.sort_by(f64::total_cmp);
+        self.kept.sort_by(f64::total_cmp);
+        println!("\n{kind}, seed {seed}: {} cases", self.cases);
+        println!("first cause right   {}", of(self.first));
+        println!("all named           {}", of(self.all));
+        println!("at least one named  {}", of(self.any));
+        println!("exact set           {}", of(self.exact));
+        println!("nothing to explain  {}", of(self.silent));
+        println!(
+            "unknown             {}, right signal first {}",
+            of(self.unknown),
+            of(self.signal)
+        );
+        println!("not stated as sure  {}", of(self.unsure));
+        println!("confident and wrong {}", of(self.wrong));
+        println!("90 % intervals that cover {} of {}", self.covered, self.intervals);
+        println!("worse on held-out drives {} of {}", self.worse, self.gains);
+        if let (Some(m), Some(w)) =
+            (self.kept.get(self.kept.len() / 2), self.kept.get(self.kept.len() / 10))
+        {
+            println!("speed gain over the way to the floor: median {m:.3}, worst tenth {w:.3}");
+        }
+        if let Some(s) = self.seconds.get(self.seconds.len() / 2) {
+            println!("time per case: median {s:.1} s");
+        }
+    }
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let usage = "usage: campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [dump=DIR]";
-    let kind = arguments.first().ok_or(usage)?.as_str();
-    let count: usize = arguments.get(1).ok_or(usage)?.parse()?;
-    let seed: u64 = arguments.get(2).ok_or(usage)?.parse()?;
+    let kind = arguments.first().ok_or(USAGE)?.as_str();
+    let count: usize = arguments.get(1).ok_or(USAGE)?.parse()?;
+    let seed: u64 = arguments.get(2).ok_or(USAGE)?.parse()?;
     let option = |key: &str| arguments.iter().find_map(|a| a.strip_prefix(key));
+    let number = |key: &str, default: usize| option(key).map_or(Ok(default), str::parse::<usize>);
     let mut campaign = Campaign::FULL;
-    if let Some(n) = option("drives=") {
-        campaign.drives = n.parse()?;
-    }
+    campaign.drives = number("drives=", campaign.drives)?;
     if let Some(s) = option("seconds=") {
         campaign.duration_s = s.parse()?;
     }
-    let base = TruckParameters::load("reference")?;
+    let (from, to) = (number("from=", 0)?, number("to=", usize::MAX)?);
     let plant = Plant::reference()?;
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let usual = Campaign { drives: 8, ..campaign };
-    let clean = generate(&base, &[], &usual, seed.wrapping_mul(7919) + 1)?;
+    let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
     let mut t = Table::default();
-    for case in 0..count {
-        let draw = |m: Magnitude, k: usize, rng: &mut ChaCha8Rng| {
-            let id = option("only=").unwrap_or(CATALOGUE[k % 34].id);
-            hide(id, m, rng).into_iter().collect::<Vec<Effect>>()
-        };
-        let hidden = match kind {
-            "clean" => Vec::new(),
-            "small" => draw(Magnitude::Small, case, &mut rng),
-            "medium" | "deleted" => draw(Magnitude::Medium, case, &mut rng),
-            "large" => draw(Magnitude::Large, case, &mut rng),
-            "pairs" => {
-                let a = rng.random_range(0..34);
-                let b = (a + rng.random_range(1..34)) % 34;
-                let mut v = draw(Magnitude::Medium, a, &mut rng);
-                v.extend(hide(CATALOGUE[b].id, Magnitude::Medium, &mut rng));
-                v
-            }
-            "outside" => {
-                let o = &OUTSIDE[case % OUTSIDE.len()];
-                let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
-                let sign = if o.1 > 1.0 || o.2 == "shift_in_process" { 1.0 } else { sign };
-                vec![Effect::Outside {
-                    kind: o.0,
-                    size: sign * o.1 * (0.7 + 0.6 * rng.random::<f64>()),
-                }]
-            }
-            _ => return Err(usage.into()),
-        };
-        if option("from=").is_some_and(|n| n.parse::<usize>().is_ok_and(|n| case < n)) {
+    for case in 0..count.min(to) {
+        let case_seed = seed.wrapping_mul(1_000_003) + case as u64;
+        let mut rng = ChaCha8Rng::seed_from_u64(case_seed ^ 0x5eed);
+        let hidden = draw(kind, case, option("only="), &mut rng).ok_or(USAGE)?;
+        if case < from {
             continue;
         }
-        let case_seed = seed.wrapping_mul(1_000_003) + case as u64;
-        let mut set = generate(&base, &hidden, &campaign, case_seed)?;
+        let mut set = generate(&hidden, &campaign, case_seed);
         if let Some(without) = option("without=") {
             for name in without.split(',') {
                 let channel = Channel::of(name).ok_or_else(|| format!("no channel {name}"))?;
@@ -188,94 +296,33 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if let Some(folder) = option("dump=") {
             dump(&set, Path::new(folder))?;
         }
-        let truth: Vec<&str> = hidden
-            .iter()
-            .filter_map(|e| if let Effect::Cause { id, .. } = e { Some(*id) } else { None })
-            .collect();
         let mut options = Options::default();
-        if kind == "deleted" {
-            options.excluded = truth.iter().map(|s| (*s).to_owned()).collect();
+        let deleted = kind == "deleted";
+        if deleted {
+            options.excluded = hidden
+                .iter()
+                .filter_map(|e| match e {
+                    Effect::Cause { id, .. } => Some((*id).to_owned()),
+                    Effect::Outside { .. } => None,
+                })
+                .collect();
         }
         let start = std::time::Instant::now();
         let d = diagnose(&plant, &set, Some(&clean), &options, &Serial, &mut |_| {})?;
         let seconds = start.elapsed().as_secs_f64();
-        let named: Vec<&str> = d.causes.iter().map(|c| c.id).collect();
-        let observable = |id: &&&str| !d.not_observable.iter().any(|n| n.id == **id);
-        let visible: Vec<&&str> = truth.iter().filter(observable).collect();
-        t.cases += 1;
         t.seconds.push(seconds);
-        let hit = visible.iter().filter(|id| named.contains(**id)).count();
-        let unseen = visible.is_empty() && named.is_empty();
-        let first = named.first().is_some_and(|n| truth.contains(n)) || unseen;
-        let all = hit == visible.len();
-        let exact = all && named.len() == visible.len() && d.verdict != Verdict::Unknown;
-        t.first += usize::from(first);
-        t.all += usize::from(all);
-        t.any += usize::from(hit > 0 || unseen);
-        t.exact += usize::from(exact);
-        t.silent += usize::from(named.is_empty() && d.verdict == Verdict::NothingToExplain);
-        t.wrong += usize::from(
-            d.verdict == Verdict::Explained && named.first().is_some_and(|n| !truth.contains(n)),
-        );
-        t.unknown += usize::from(d.verdict == Verdict::Unknown);
-        t.unsure += usize::from(d.verdict != Verdict::Explained);
-        if let Some(Effect::Outside { kind, .. }) = hidden.first()
-            && let (Some(o), Some(u)) = (OUTSIDE.iter().find(|o| o.0 == *kind), &d.unknown)
-        {
-            let right = u.signals.first().is_some_and(|s| o.3.contains(s)) && u.quantity == o.2;
-            t.signal += usize::from(right && d.verdict == Verdict::Unknown);
-        }
-        let mut off = String::new();
-        for e in &hidden {
-            if let Effect::Cause { id, size, .. } = e
-                && let Some(c) = d.causes.iter().find(|c| c.id == *id)
-                && let Some((key, value)) = expected(id, *size)
-                && let Some(p) = c.parameters.get(key)
-            {
-                let z = (p.value - value) / p.sigma;
-                t.intervals += 1;
-                t.covered += usize::from(z.abs() <= 1.645);
-                off += &format!(" z={z:.1} (true {value:.4})");
-            }
-        }
-        if let Some(g) = &d.gain {
-            t.worse += usize::from(g.log_score_nats < 0.0);
-            let (b, a) = (g.speed_rmse_m_s.before, g.speed_rmse_m_s.after);
-            let floor = d.wrong.first().map_or(0.0, |w| w.noise_floor);
-            if b > 1.5 * floor {
-                t.kept.push((b - a) / (b - floor));
-            }
-        }
-        let mark = if truth.is_empty() {
-            if named.is_empty() { "." } else { "X" }
-        } else if exact {
-            "."
-        } else if first {
-            "+"
-        } else if named.is_empty() {
-            "-"
-        } else {
-            "X"
-        };
-        println!("{mark} {case} {hidden:?}\n      {seconds:.1} s {}{off}", line(&d));
+        let (mark, off) = t.count(&hidden, &d, deleted);
+        let what: Vec<String> = hidden
+            .iter()
+            .map(|e| match e {
+                Effect::Cause { id, size, shape } => format!("{id} {size:.4} {:.2?}", shape.0),
+                Effect::Outside { kind, size, shape } => {
+                    format!("{kind:?} {size:.4} {:.2?}", shape.0)
+                }
+            })
+            .collect();
+        println!("{mark} {case} {} | {seconds:.1} s {}{off}", what.join(" & "), line(&d));
     }
-    let of = |n: usize| format!("{n}/{} ({:.1} %)", t.cases, 100.0 * n as f64 / t.cases as f64);
-    t.seconds.sort_by(f64::total_cmp);
-    t.kept.sort_by(f64::total_cmp);
-    println!("\n{kind}, seed {seed}: {} cases", t.cases);
-    println!("first cause right   {}", of(t.first));
-    println!("all named           {}", of(t.all));
-    println!("at least one named  {}", of(t.any));
-    println!("exact set           {}", of(t.exact));
-    println!("nothing to explain  {}", of(t.silent));
-    println!("unknown             {}, right signal first {}", of(t.unknown), of(t.signal));
-    println!("not stated as sure  {}", of(t.unsure));
-    println!("confident and wrong {}", of(t.wrong));
-    println!("90 % intervals that cover {} of {}", t.covered, t.intervals);
-    println!("worse on held-out drives {}", of(t.worse));
-    if let (Some(m), Some(w)) = (t.kept.get(t.kept.len() / 2), t.kept.get(t.kept.len() / 10)) {
-        println!("speed gain over the way to the noise floor: median {m:.3}, worst tenth {w:.3}");
-    }
-    println!("time per case: median {:.1} s", t.seconds[t.seconds.len() / 2]);
+    t.print(kind, seed);
     Ok(())
 }

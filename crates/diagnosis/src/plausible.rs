@@ -8,7 +8,13 @@ const MAX_DEVIATION: f64 = 0.08;
 /// Shortest drive that can be judged, s: a rollout, and the rest of the filters' memory.
 const MIN_DURATION_S: f64 = 90.0;
 
-/// Refuses drives that are too short, or that hold values which are no numbers.
+/// Change of speed between samples, m/s, that no truck makes (40 m/s²), and the part of the samples
+/// with one above which the rows are not in the order of time.
+const MAX_JUMP_M_S: f64 = 2.0;
+const MAX_JUMPS_FRAC: f64 = 0.05;
+
+/// Refuses drives that are too short, whose rows are in no order, or that hold values which are no
+/// numbers.
 pub(crate) fn check_length(set: &DriveSet) -> Result<(), DiagnosisError> {
     for d in &set.drives {
         if d.duration_s() < MIN_DURATION_S {
@@ -18,6 +24,16 @@ pub(crate) fn check_length(set: &DriveSet) -> Result<(), DiagnosisError> {
                     d.name,
                     d.len,
                     d.duration_s()
+                ),
+            });
+        }
+        let speed = d.get(C::SpeedMS).unwrap_or_default();
+        let jumps = speed.windows(2).filter(|w| (w[1] - w[0]).abs() > MAX_JUMP_M_S).count();
+        if jumps as f64 > MAX_JUMPS_FRAC * d.len as f64 {
+            return Err(DiagnosisError::NoDrives {
+                what: format!(
+                    "{}: speed_m_s jumps by more than {MAX_JUMP_M_S} m/s {jumps} times: rows are not in the order of time",
+                    d.name
                 ),
             });
         }

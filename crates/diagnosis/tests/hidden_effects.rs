@@ -6,14 +6,14 @@
 mod support;
 
 use diagnosis::{Diagnosis, DiagnosisError, DriveSet, Options, Plant, Serial, Verdict, diagnose};
-use dynamics::TruckParameters;
-use support::effects::{Effect, Outside, Shape};
+use support::effects::{Effect, Shape};
+use support::outside::Outside;
 use support::{Campaign, generate};
 
 const SHORT: Campaign = Campaign { drives: 3, duration_s: 420.0, tolerance: 1.0 };
 
 fn drives(hidden: &[Effect], seed: u64) -> DriveSet {
-    generate(&TruckParameters::load("reference").unwrap(), hidden, &SHORT, seed).unwrap()
+    generate(hidden, &SHORT, seed)
 }
 
 fn judge(set: &DriveSet) -> Result<Diagnosis, DiagnosisError> {
@@ -23,7 +23,7 @@ fn judge(set: &DriveSet) -> Result<Diagnosis, DiagnosisError> {
 }
 
 fn cause(id: &'static str, size: f64) -> Effect {
-    Effect::Cause { id, size, shape: Shape { width: 1.0, ..Shape::default() } }
+    Effect::Cause { id, size, shape: Shape([0.5; 4]) }
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn slow_shifts_and_soft_trailer_tyres_are_named_together_with_their_sizes() {
 
 #[test]
 fn an_effect_outside_the_catalogue_is_unknown_with_its_signal() {
-    let hidden = [Effect::Outside { kind: Outside::FuelRpm, size: 0.2 }];
+    let hidden = [Effect::Outside { kind: Outside::FuelRpm, size: 0.2, shape: Shape([0.5; 4]) }];
     let d = judge(&drives(&hidden, 31)).unwrap();
     assert_eq!(d.verdict, Verdict::Unknown, "{:?}", d.causes);
     let unknown = d.unknown.unwrap();

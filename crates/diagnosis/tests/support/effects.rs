@@ -1,171 +1,155 @@
-//! Hidden effects: every cause of the catalogue with shapes of its own, and effects outside it.
+//! Hidden causes of the catalogue: what each changes in the truck, with sizes and shapes of the
+//! generator's own.
 
-use dynamics::TruckParameters;
-use dynamics::catalogue::{Estimate, cause};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::road::between;
+use super::outside::Outside;
+use super::random::{between, sign};
+use super::sheet::{AXLE, Figures, RADIUS_M, full_load};
 
 /// What is wrong with the truck, beyond its tolerances.
 #[derive(Debug, Clone)]
 pub(crate) enum Effect {
-    /// A cause of the catalogue: id, size in the catalogue's unit, and a drawn shape.
+    /// A cause of the catalogue: id, size in the unit of [`SIZES`], and a drawn shape.
     Cause { id: &'static str, size: f64, shape: Shape },
     /// An effect that the catalogue does not have.
-    Outside { kind: Outside, size: f64 },
+    Outside { kind: Outside, size: f64, shape: Shape },
 }
 
-/// How an effect looks beyond what the truck file can say.
+/// How an effect looks beyond its size: four numbers between 0 and 1.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Shape {
-    /// Variant where the effect has several forms.
-    pub(crate) variant: u8,
-    /// Offset of the threshold, in prior spreads of the catalogue.
-    pub(crate) threshold: f64,
-    /// Factor on the width, the time constant or the knee.
-    pub(crate) width: f64,
-    /// Direction of a vector, rad.
-    pub(crate) angle: f64,
-}
+pub(crate) struct Shape(pub(crate) [f64; 4]);
 
 impl Shape {
     pub(crate) fn draw(rng: &mut ChaCha8Rng) -> Self {
-        Self {
-            variant: rng.random::<u8>(),
-            threshold: between(rng, -1.0, 1.0),
-            width: between(rng, -0.4, 0.4).exp(),
-            angle: between(rng, 0.0, core::f64::consts::TAU),
-        }
+        Self([rng.random(), rng.random(), rng.random(), rng.random()])
+    }
+
+    /// The `i`-th number mapped between two bounds.
+    pub(crate) fn at(&self, i: usize, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.0[i]
+    }
+
+    /// A choice among `n`.
+    pub(crate) fn choice(&self, i: usize, n: usize) -> usize {
+        ((self.0[i] * n as f64) as usize).min(n - 1)
     }
 }
 
-/// Effects outside the catalogue: channel in which it shows, signal that it follows.
+/// Id, medium size, whether either sign occurs.
+pub(crate) const SIZES: [(&str, f64, bool); 34] = [
+    ("rolling_resistance", 0.16, true),
+    ("air_drag", 0.13, true),
+    ("headwind", 2.2, true),
+    ("wind", 4.5, false),
+    ("mass", 0.08, true),
+    ("grade_bias", 0.0016, true),
+    ("map_shift", 30.0, true),
+    ("tyre_warmup", 0.30, false),
+    ("driveline_loss", 0.035, false),
+    ("fan_load", 22.0, false),
+    ("dragging_brake", 600.0, false),
+    ("engine_friction", 0.28, true),
+    ("altitude_derate", 0.08, false),
+    ("heat_derate", 0.06, false),
+    ("turbo_lag", 0.45, false),
+    ("pedal_delay", 0.2, false),
+    ("shift_duration", 0.4, false),
+    ("fuel_map_low_load", 0.2, true),
+    ("brake_gain", 0.17, true),
+    ("brake_fade", 0.30, false),
+    ("brake_delay", 0.2, false),
+    ("hidden_retarder", 800.0, false),
+    ("speed_scale", 0.02, true),
+    ("yaw_rate_bias", 0.004, true),
+    ("steering_ratio", 0.07, true),
+    ("steering_offset", 0.05, true),
+    ("steering_free_play", 0.07, false),
+    ("steering_lag", 0.13, false),
+    ("cornering_stiffness_front", 0.22, true),
+    ("cornering_stiffness_drive", 0.22, true),
+    ("cornering_stiffness_trailer", 0.25, true),
+    ("payload_position", 0.6, true),
+    ("road_bank", 0.014, true),
+    ("crosswind", 4.0, true),
+];
+
+/// How large a hidden cause is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Outside {
-    /// Drag force with the square of the curvature.
-    CurveDrag,
-    /// Force near one engine speed.
-    RpmForce,
-    /// Force that grows along the drive.
-    TimeForce,
-    /// Force on one stretch of ambient temperature.
-    AltitudeForce,
-    /// Torque dip near one engine speed.
-    TorqueDip,
-    /// Torque falls along the drive.
-    TorqueTime,
-    /// Fuel grows with the ambient temperature or altitude.
-    FuelAltitude,
-    /// Fuel has a bump over the engine speed.
-    FuelRpm,
-    /// Brake pressure falls short at large demand.
-    PressureSaturation,
-    /// Yaw sensor gain.
-    YawGain,
-    /// Trailer gyro gain.
-    TrailerYawGain,
-    /// Lateral accelerometer gain.
-    AccelYGain,
-    /// GPS speed off with the altitude.
-    GpsAltitude,
-    /// Shifts slower when the coolant is cold.
-    ShiftTemperature,
-    /// Side gusts.
-    Gusts,
+pub(crate) enum Magnitude {
+    Small,
+    Medium,
+    Large,
 }
 
-/// All of them, with the quantity in which each shows and signals that count as right.
-pub(crate) const OUTSIDE: &[(Outside, f64, &str, &[&str])] = &[
-    (
-        Outside::CurveDrag,
-        2500.0,
-        "speed_m_s",
-        &["curvature_1_m", "steering_wheel_rad", "yaw_rate_rad_s", "accel_y_m_s2"],
-    ),
-    (Outside::RpmForce, 1500.0, "speed_m_s", &["engine_speed_rpm"]),
-    (Outside::TimeForce, 1500.0, "speed_m_s", &["time_s"]),
-    (Outside::AltitudeForce, 1500.0, "speed_m_s", &["gps_altitude_m"]),
-    (Outside::TorqueDip, 0.12, "engine_torque_percent", &["engine_speed_rpm"]),
-    (Outside::TorqueTime, 0.10, "engine_torque_percent", &["time_s"]),
-    (Outside::FuelAltitude, 0.12, "fuel_rate_g_s", &["gps_altitude_m"]),
-    (Outside::FuelRpm, 0.12, "fuel_rate_g_s", &["engine_speed_rpm"]),
-    (
-        Outside::PressureSaturation,
-        0.35,
-        "brake_pressure_kpa",
-        &["xbr_decel_m_s2", "brake_pressure_kpa"],
-    ),
-    (
-        Outside::YawGain,
-        0.08,
-        "yaw_rate_rad_s",
-        &["yaw_rate_rad_s", "curvature_1_m", "steering_wheel_rad", "accel_y_m_s2"],
-    ),
-    (
-        Outside::TrailerYawGain,
-        0.08,
-        "trailer_yaw_rate_rad_s",
-        &[
-            "trailer_yaw_rate_rad_s",
-            "yaw_rate_rad_s",
-            "curvature_1_m",
-            "steering_wheel_rad",
-            "accel_y_m_s2",
-        ],
-    ),
-    (
-        Outside::AccelYGain,
-        0.10,
-        "accel_y_m_s2",
-        &["accel_y_m_s2", "yaw_rate_rad_s", "curvature_1_m", "steering_wheel_rad"],
-    ),
-    (Outside::GpsAltitude, 0.02, "gps_speed_m_s", &["gps_altitude_m"]),
-    (Outside::ShiftTemperature, 0.5, "shift_in_process", &["coolant_temp_degc", "time_s"]),
-    (Outside::Gusts, 3000.0, "yaw_rate_rad_s", &["gusts"]),
-];
+/// Draws size and shape of a cause; `None` if there is no such id.
+pub(crate) fn hide(id: &str, magnitude: Magnitude, rng: &mut ChaCha8Rng) -> Option<Effect> {
+    let (id, medium, either) = *SIZES.iter().find(|s| s.0 == id)?;
+    let factor = match magnitude {
+        Magnitude::Small => between(rng, 0.35, 0.55),
+        Magnitude::Medium => between(rng, 0.75, 1.25),
+        Magnitude::Large => between(rng, 1.5, 2.1),
+    };
+    let size = medium * factor * if either { sign(rng) } else { 1.0 };
+    Some(Effect::Cause { id, size, shape: Shape::draw(rng) })
+}
 
-/// Effects whose shape the generator makes itself, so that it need not be the library's.
-const OWN_SHAPE: &[&str] = &[
-    "tyre_warmup",
-    "fan_load",
-    "altitude_derate",
-    "heat_derate",
-    "brake_fade",
-    "hidden_retarder",
-    "fuel_map_low_load",
-];
-
-/// The truck with the effects that its file can say.
-pub(crate) fn truck(
-    base: &TruckParameters,
-    effects: &[Effect],
-) -> Result<TruckParameters, dynamics::DynamicsError> {
-    let mut truck = base.clone();
+/// Puts the causes that are a figure of the truck into it.
+pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
     for e in effects {
         let Effect::Cause { id, size, shape } = e else { continue };
-        if OWN_SHAPE.contains(id) {
-            continue;
+        let x = *size;
+        match *id {
+            "rolling_resistance" => f.rolling *= 1.0 + x,
+            "air_drag" => f.drag_area *= 1.0 + x,
+            "headwind" => f.headwind += x,
+            "wind" => {
+                let (sin, cos) = shape.at(0, 0.0, core::f64::consts::TAU).sin_cos();
+                f.wind = [f.wind[0] + x * cos, f.wind[1] + x * sin];
+            }
+            "mass" => {
+                f.mass_scale *= 1.0 + x;
+                f.tyres_follow = shape.choice(0, 2) == 1;
+            }
+            "grade_bias" => f.grade_bias += x,
+            "map_shift" => f.map_shift_m += x,
+            "driveline_loss" => f.efficiency *= 1.0 - x,
+            "dragging_brake" => f.drag_force_n += x,
+            "engine_friction" => f.friction_scale *= 1.0 + x,
+            "turbo_lag" => f.boost_lag_s += x,
+            "pedal_delay" => f.pedal_delay_s += x,
+            "shift_duration" => f.shift_extra_s += x,
+            "brake_gain" => f.brake_scale *= 1.0 + x,
+            "brake_delay" => f.brake_delay_s += x,
+            "speed_scale" => f.speed_scale *= 1.0 + x,
+            "yaw_rate_bias" => f.yaw_bias += x,
+            "steering_ratio" => f.steer_ratio *= 1.0 + x,
+            "steering_offset" => f.steer_offset_rad += x,
+            "steering_free_play" => f.free_play_rad += x,
+            "steering_lag" => f.steer_lag_s += x,
+            "cornering_stiffness_front" => f.stiffness[0] *= 1.0 + x,
+            "cornering_stiffness_drive" => f.stiffness[1] *= 1.0 + x,
+            "cornering_stiffness_trailer" => f.stiffness[2] *= 1.0 + x,
+            "payload_position" => {
+                f.payload_rearward_m += x;
+                f.tyres_follow = shape.choice(0, 2) == 1;
+            }
+            "road_bank" => f.bank_rad += x,
+            "crosswind" => f.crosswind += x,
+            _ => {}
         }
-        let Some(c) = cause(id) else { continue };
-        let sizes = match c.sizes.len() {
-            2 => vec![size * shape.angle.cos(), size * shape.angle.sin()],
-            _ => vec![*size],
-        };
-        let estimates: Vec<Estimate> =
-            sizes.iter().map(|s| Estimate { size: *s, sigma: 0.0 }).collect();
-        let overlay = c.overlay(&truck, &truck.name, &estimates, "hidden")?;
-        truck = truck.with_overlay(&overlay)?;
     }
-    Ok(truck)
 }
 
 /// What an effect may look at, at one moment of the drive.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Now {
     pub(crate) time_s: f64,
+    pub(crate) place_m: f64,
     pub(crate) speed: f64,
     pub(crate) rpm: f64,
+    pub(crate) indicated_nm: f64,
     pub(crate) pedal: f64,
     pub(crate) stage: f64,
     pub(crate) xbr: f64,
@@ -173,186 +157,135 @@ pub(crate) struct Now {
     pub(crate) ambient_degc: f64,
     pub(crate) altitude_m: f64,
     pub(crate) curvature: f64,
-    pub(crate) pressure_kpa: f64,
+    pub(crate) service_n: f64,
+    pub(crate) brake_k: f64,
     pub(crate) mass_kg: f64,
-    pub(crate) engaged: bool,
+    pub(crate) gear: usize,
     pub(crate) warm: bool,
 }
 
-/// What the effects with shapes of their own do now.
+/// What the effects with a course of their own do now.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Acting {
     /// Force against the motion, N.
     pub(crate) force_n: f64,
-    /// Part of the full load that is lost.
+    /// Torque taken from the crank, Nm.
+    pub(crate) crank_nm: f64,
+    /// Factor on the full load.
     pub(crate) derate: f64,
-    /// Factor on the pedal that the engine sees.
-    pub(crate) pedal: f64,
-    /// Factor on the pressure demand.
-    pub(crate) pressure: f64,
-    /// Factor on the logged fuel.
+    /// Factor on the demanded torque.
+    pub(crate) demand: f64,
+    /// Factor and offset, kPa, of the pressure.
+    pub(crate) pressure: [f64; 2],
+    /// Factor on the service brake's force.
+    pub(crate) friction: f64,
+    /// Factor on the fuel.
     pub(crate) fuel: f64,
-    /// Factors on logged yaw rate, trailer yaw rate, lateral acceleration, GPS speed.
-    pub(crate) yaw: f64,
-    pub(crate) trailer_yaw: f64,
-    pub(crate) accel_y: f64,
-    pub(crate) gps: f64,
-    /// Side force of gusts, N.
-    pub(crate) side_n: f64,
+    /// Factor and offset of the logged yaw rate, trailer yaw rate, lateral acceleration, GPS speed.
+    pub(crate) yaw: [f64; 2],
+    pub(crate) trailer_yaw: [f64; 2],
+    pub(crate) accel_y: [f64; 2],
+    pub(crate) gps: [f64; 2],
+    /// Side forces on the tractor's and the trailer's CG, N.
+    pub(crate) side_n: [f64; 2],
+    /// Extra length of a shift that begins now, s.
+    pub(crate) shift_s: f64,
+}
+
+impl Acting {
+    pub(crate) const NOTHING: Self = Self {
+        force_n: 0.0,
+        crank_nm: 0.0,
+        derate: 1.0,
+        demand: 1.0,
+        pressure: [1.0, 0.0],
+        friction: 1.0,
+        fuel: 1.0,
+        yaw: [1.0, 0.0],
+        trailer_yaw: [1.0, 0.0],
+        accel_y: [1.0, 0.0],
+        gps: [1.0, 0.0],
+        side_n: [0.0; 2],
+        shift_s: 0.0,
+    };
 }
 
 /// Memory of the effects.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Memory {
-    fan_on: bool,
-    brake_k: f64,
-    gust_n: f64,
+    fan_goal: f64,
+    fan: f64,
+    pub(crate) gust: f64,
 }
 
-fn knee(x: f64, width: f64) -> f64 {
-    // soft maximum of zero and x
-    0.5 * (x + (x * x + width * width).sqrt())
-}
-
-/// Advances the memory by `dt` and says what acts.
+/// Adds a cause of the catalogue to what acts; `dt` since the last call, s.
 pub(crate) fn act(
-    effects: &[Effect],
+    a: &mut Acting,
     m: &mut Memory,
+    (id, size, shape): (&str, f64, &Shape),
     now: &Now,
-    rng: &mut ChaCha8Rng,
     dt: f64,
-) -> Acting {
-    let mut a = Acting {
-        force_n: 0.0,
-        derate: 0.0,
-        pedal: 1.0,
-        pressure: 1.0,
-        fuel: 1.0,
-        yaw: 1.0,
-        trailer_yaw: 1.0,
-        accel_y: 1.0,
-        gps: 1.0,
-        side_n: 0.0,
-    };
-    let service_n = 400.0 * now.pressure_kpa;
-    m.brake_k += dt * (service_n * now.speed / 200e3 - m.brake_k / 600.0);
-    let eta = 0.98 * 0.97;
-    for e in effects {
-        match e {
-            Effect::Cause { id, size, shape } => match *id {
-                "tyre_warmup" if !now.warm => {
-                    let tau = 1500.0 * shape.width;
-                    a.force_n += 0.0062 * 9.81 * now.mass_kg * size * (-now.time_s / tau).exp();
-                }
-                "fan_load" => {
-                    let start = 94.0 + 3.0 * shape.threshold;
-                    let hysteresis = if shape.variant % 2 == 0 { 3.0 * shape.width } else { 0.3 };
-                    if now.coolant_degc > start {
-                        m.fan_on = true;
-                    }
-                    if now.coolant_degc < start - hysteresis {
-                        m.fan_on = false;
-                    }
-                    if m.fan_on && now.engaged && now.speed > 1.0 {
-                        a.force_n += size / now.speed * eta;
-                    }
-                }
-                "altitude_derate" => {
-                    let over = now.altitude_m - 1500.0 - 400.0 * shape.threshold;
-                    a.derate += size * knee(over, 150.0 * shape.width);
-                }
-                "heat_derate" => {
-                    let over = if shape.variant % 2 == 0 {
-                        knee(now.ambient_degc - 30.0 - 4.0 * shape.threshold, 1.0)
-                    } else {
-                        knee(now.coolant_degc - 97.0 - 2.0 * shape.threshold, 1.0)
-                    };
-                    a.derate += size * over;
-                }
-                "brake_fade" => {
-                    let over = now.ambient_degc + m.brake_k - 150.0 - 40.0 * shape.threshold;
-                    let loss = (size * knee(over, 15.0 * shape.width)).min(0.7);
-                    a.force_n -= loss * service_n;
-                }
-                "hidden_retarder" => {
-                    let on = match shape.variant % 3 {
-                        0 => now.stage,
-                        1 => f64::from(now.pedal < 0.01 && now.speed > 8.0),
-                        _ => (now.xbr / 0.8).min(1.0),
-                    };
-                    a.force_n += on * size * 2.85 / 0.53 * (now.speed / 6.0).min(1.0);
-                }
-                _ => {}
-            },
-            Effect::Outside { kind, size } => match kind {
-                Outside::CurveDrag => {
-                    a.force_n += size * (now.curvature * now.curvature) / (0.0025 * 0.0025);
-                }
-                Outside::RpmForce => {
-                    let x = (now.rpm - 1300.0) / 90.0;
-                    if now.engaged {
-                        a.force_n += size * (-0.5 * x * x).exp();
-                    }
-                }
-                Outside::TimeForce => a.force_n += size * (now.time_s / 1500.0).powi(2),
-                Outside::AltitudeForce => {
-                    a.force_n += size * (now.altitude_m / 1500.0).clamp(0.0, 1.5);
-                }
-                Outside::TorqueDip => {
-                    let x = (now.rpm - 1250.0) / 80.0;
-                    a.pedal *= 1.0 - size * (-0.5 * x * x).exp();
-                }
-                Outside::TorqueTime => a.pedal *= 1.0 - size * (now.time_s / 1500.0).min(1.0),
-                Outside::FuelAltitude => a.fuel *= 1.0 + size * now.altitude_m / 1500.0,
-                Outside::FuelRpm => {
-                    let x = (now.rpm - 1300.0) / 120.0;
-                    a.fuel *= 1.0 + size * (-0.5 * x * x).exp();
-                }
-                Outside::PressureSaturation => {
-                    a.pressure *= 1.0 - size * (now.xbr / 1.2).min(1.0);
-                }
-                Outside::YawGain => a.yaw *= 1.0 + size,
-                Outside::TrailerYawGain => a.trailer_yaw *= 1.0 + size,
-                Outside::AccelYGain => a.accel_y *= 1.0 + size,
-                Outside::GpsAltitude => a.gps *= 1.0 + size * now.altitude_m / 1500.0,
-                Outside::ShiftTemperature => {}
-                Outside::Gusts => {
-                    m.gust_n += dt * (-m.gust_n / 1.5)
-                        + size * (2.0 * dt / 1.5).sqrt() * super::road::normal(rng);
-                    a.side_n += m.gust_n;
-                }
-            },
-        }
-    }
-    a
-}
-
-/// Factor of the low-load extra on the logged fuel.
-pub(crate) fn low_load(effects: &[Effect], indicated_nm: f64, rpm: f64) -> f64 {
-    let mut factor = 1.0;
-    for e in effects {
-        if let Effect::Cause { id: "fuel_map_low_load", size, shape } = e {
-            let kw = indicated_nm * rpm / 9549.3;
-            let x = if shape.variant % 2 == 0 {
-                kw / (80.0 * shape.width)
+) {
+    match id {
+        "tyre_warmup" if !now.warm => {
+            let tau = shape.at(0, 900.0, 2100.0);
+            let left = if shape.choice(1, 2) == 0 {
+                (-now.time_s / tau).exp()
             } else {
-                indicated_nm / (700.0 * shape.width)
+                1.0 / (1.0 + (now.time_s / tau).powf(1.3))
             };
-            factor *= 1.0 + size * (1.0 - x).max(0.0);
+            a.force_n += 0.0062 * 9.81 * now.mass_kg * size * left;
         }
-    }
-    factor
-}
-
-/// Extra length of shifts at this coolant temperature, as a factor.
-pub(crate) fn shift_factor(effects: &[Effect], coolant_degc: f64) -> f64 {
-    effects
-        .iter()
-        .map(|e| match e {
-            Effect::Outside { kind: Outside::ShiftTemperature, size } => {
-                size * ((92.0 - coolant_degc) / 10.0).clamp(0.0, 1.0)
+        "fan_load" => {
+            let on = shape.at(0, 92.0, 99.0);
+            let off = on - shape.at(1, 1.0, 7.0);
+            if now.coolant_degc > on {
+                m.fan_goal = 1.0;
+            } else if now.coolant_degc < off {
+                m.fan_goal = 0.0;
             }
-            _ => 0.0,
-        })
-        .fold(1.0, |a, x| a + x)
+            m.fan += (m.fan_goal - m.fan) * dt / 1.5;
+            a.crank_nm += 1e3 * size * m.fan * 9.549_3 / now.rpm.max(500.0);
+        }
+        "altitude_derate" => {
+            let over = (now.altitude_m - shape.at(0, 700.0, 1700.0)).max(0.0) * 1e-3;
+            a.derate *= 1.0 - (size * over.powf(shape.at(1, 0.85, 1.25))).min(0.6);
+        }
+        "heat_derate" => {
+            let over = if shape.choice(1, 2) == 0 {
+                now.ambient_degc - shape.at(0, 22.0, 32.0)
+            } else {
+                now.coolant_degc - shape.at(0, 93.0, 100.0)
+            };
+            a.derate *= 1.0 - (0.1 * size * over.max(0.0)).min(0.6);
+        }
+        "brake_fade" => {
+            let over = now.ambient_degc + now.brake_k - shape.at(0, 90.0, 200.0);
+            let loss = 0.01 * size * over.max(0.0);
+            a.friction *= 1.0 - loss / (1.0 + loss);
+        }
+        "hidden_retarder" => {
+            let on = match shape.choice(0, 3) {
+                0 => now.stage,
+                1 => f64::from(now.pedal < 0.01 && now.speed > shape.at(1, 3.0, 9.0)),
+                _ => (now.xbr / shape.at(1, 0.5, 1.2)).min(1.0),
+            };
+            let fall = (now.speed / 5.0).min(1.0) * (1.0 + shape.at(2, -0.2, 0.2));
+            a.force_n += on * size * AXLE / RADIUS_M * fall;
+        }
+        "fuel_map_low_load" => {
+            let (x, knee) = match shape.choice(0, 3) {
+                0 => (now.indicated_nm / full_load(now.rpm).max(100.0), shape.at(1, 0.2, 0.5)),
+                1 => (now.indicated_nm * now.rpm / 9549.3, shape.at(1, 50.0, 130.0)),
+                _ => (now.indicated_nm / 2700.0, shape.at(1, 0.15, 0.4)),
+            };
+            let course = if shape.choice(2, 2) == 0 {
+                (1.0 - x / knee).max(0.0)
+            } else {
+                1.0 / (1.0 + ((x / knee - 1.0) / 0.2).exp())
+            };
+            a.fuel *= 1.0 + size * course;
+        }
+        _ => {}
+    }
 }

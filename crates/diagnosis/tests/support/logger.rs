@@ -3,13 +3,13 @@
 use diagnosis::{Channel as C, Drive};
 use rand_chacha::ChaCha8Rng;
 
-use super::road::normal;
+use super::random::normal;
 
-/// Channel, samples held, resolution, noise.
+/// Channel, samples held, resolution, noise (of the rate for fuel).
 const CHANNELS: &[(C, usize, f64, f64)] = &[
-    (C::SMapM, 1, 0.1, 0.0),
-    (C::SpeedMS, 2, 1.0 / 921.6, 0.012),
-    (C::GpsSpeedMS, 2, 0.01, 0.05),
+    (C::SMapM, 4, 0.1, 0.0),
+    (C::SpeedMS, 2, 1.0 / 921.6, 0.0),
+    (C::GpsSpeedMS, 2, 0.01, 0.03),
     (C::GpsAltitudeM, 4, 0.1, 0.3),
     (C::HeadingRad, 1, 1.0 / 1024.0, 0.003),
     (C::AccelXMS2, 1, 0.005, 0.12),
@@ -21,39 +21,65 @@ const CHANNELS: &[(C, usize, f64, f64)] = &[
     (C::EngineBrakeFrac, 1, 0.01, 0.0),
     (C::XbrDecelMS2, 1, 1.0 / 2048.0, 0.0),
     (C::BrakePressureKpa, 2, 5.0, 0.0),
-    (C::SteeringWheelRad, 1, 1.0 / 1024.0, 0.002),
+    (C::SteeringWheelRad, 1, 1.0 / 1024.0, 0.0028),
     (C::YawRateRadS, 1, 1.0 / 8192.0, 0.0015),
     (C::TrailerYawRateRadS, 1, 1.0 / 8192.0, 0.002),
     (C::AccelYMS2, 1, 1.0 / 2048.0, 0.1),
-    (C::FuelRateGS, 2, 0.0116, 0.0),
-    (C::CoolantTempDegc, 20, 1.0, 0.0),
-    (C::AmbientTempDegc, 20, 0.25, 0.0),
-    (C::BaroPressurePa, 20, 500.0, 0.0),
+    (C::FuelRateGS, 2, 0.05 * 0.835 / 3.6, 0.01),
+    (C::CoolantTempDegc, 1, 1.0, 0.0),
+    (C::AmbientTempDegc, 1, 0.25, 0.0),
+    (C::BaroPressurePa, 1, 500.0, 0.0),
     (C::GradeFrac, 1, 0.0, 0.0),
     (C::Curvature1M, 1, 0.0, 0.0),
 ];
 
+/// Number of logged channels.
+pub(crate) const LOGGED: usize = 24;
+
 /// Writes true signals into a drive as a bus would show them.
 pub(crate) fn log(drive: &mut Drive, truth: &[Vec<f64>], rng: &mut ChaCha8Rng) {
     for ((channel, hold, step, noise), x) in CHANNELS.iter().zip(truth) {
+        let slow = match channel {
+            C::SpeedMS => running_mean(x.len(), 10, 0.0125, rng),
+            C::GpsAltitudeM => smooth(x.len(), 5.0, 0.6, rng),
+            _ => vec![0.0; x.len()],
+        };
         let mut held = 0.0;
-        let samples = x
-            .iter()
-            .enumerate()
-            .map(|(i, v)| {
-                if i % hold == 0 {
-                    let mut y = v + if *noise > 0.0 { noise * normal(rng) } else { 0.0 };
-                    if *channel == C::FuelRateGS {
-                        y *= 1.0 + 0.015 * normal(rng);
-                    }
-                    held = if *step > 0.0 { (y / step).round() * step } else { y };
-                }
-                held
-            })
-            .collect();
+        let samples = x.iter().enumerate().map(|(i, v)| {
+            if i % hold == 0 {
+                let e = if *noise > 0.0 { noise * normal(rng) } else { 0.0 };
+                let y = if *channel == C::FuelRateGS { v * (1.0 + e) } else { v + slow[i] + e };
+                held = if *step > 0.0 { (y / step).round() * step } else { y };
+            }
+            held
+        });
+        let samples = samples.collect();
         drive.set(*channel, samples);
     }
 }
 
-/// Number of logged channels.
-pub(crate) const LOGGED: usize = 24;
+/// Noise of a counter that averages over `window` samples.
+fn running_mean(n: usize, window: usize, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let scale = sigma / (window as f64).sqrt();
+    let white: Vec<f64> = (0..n + window).map(|_| scale * normal(rng)).collect();
+    let mut sum: f64 = white[..window].iter().sum();
+    (0..n)
+        .map(|i| {
+            sum += white[i + window] - white[i];
+            sum
+        })
+        .collect()
+}
+
+/// Noise of two poles of `tau_s`, s.
+pub(crate) fn smooth(n: usize, tau_s: f64, sigma: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let a = Drive::STEP_S / tau_s;
+    let (mut x, mut y) = (sigma * normal(rng), 0.0);
+    (0..n)
+        .map(|_| {
+            x += -a * x + (2.0 * a).sqrt() * 2.0_f64.sqrt() * sigma * normal(rng);
+            y += a * (x - y);
+            y
+        })
+        .collect()
+}

@@ -1,85 +1,76 @@
-//! A drawn road: grade, curvature and speed limit over the position.
+//! A drawn road: grade, curvature and target speed over the position.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Spacing of the tables, m.
-const STEP_M: f64 = 5.0;
+use super::random::{between, normal, sign};
 
-/// A road of drawn hills and curves.
+/// Spacing of the tables, m.
+const CELL_M: f64 = 4.0;
+
+/// Hills, curves and speeds of one route.
 pub(crate) struct Road {
     grade: Vec<f64>,
     curvature: Vec<f64>,
-    limit: Vec<f64>,
-    altitude: Vec<f64>,
+    speed: Vec<f64>,
 }
 
-/// A normal number (sum of uniforms).
-pub(crate) fn normal(rng: &mut ChaCha8Rng) -> f64 {
-    (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0
-}
-
-/// A number between two bounds.
-pub(crate) fn between(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
-    low + (high - low) * rng.random::<f64>()
-}
-
-/// Moving mean, twice: corners become parabolas.
-fn smooth(x: &[f64], half: usize) -> Vec<f64> {
-    let mean = |x: &[f64]| -> Vec<f64> {
-        let mut sum = vec![0.0];
-        for v in x {
-            sum.push(sum[sum.len() - 1] + v);
-        }
-        (0..x.len())
-            .map(|i| {
-                let (a, b) = (i.saturating_sub(half), (i + half + 1).min(x.len()));
-                (sum[b] - sum[a]) / (b - a) as f64
-            })
-            .collect()
-    };
-    mean(&mean(x))
+/// Running mean over `2 half + 1` cells.
+fn mean(x: &[f64], half: usize) -> Vec<f64> {
+    let mut sum = vec![0.0];
+    for v in x {
+        sum.push(sum[sum.len() - 1] + v);
+    }
+    (0..x.len())
+        .map(|i| {
+            let (a, b) = (i.saturating_sub(half), (i + half + 1).min(x.len()));
+            (sum[b] - sum[a]) / (b - a) as f64
+        })
+        .collect()
 }
 
 impl Road {
-    /// A road of `length_m` that starts at an altitude; `hilliness` is the spread of its grade.
+    /// A route of `length_m` whose grade spreads by `hills` around `climb`, driven at `cruise` m/s.
     pub(crate) fn draw(
         rng: &mut ChaCha8Rng,
         length_m: f64,
-        start_altitude_m: f64,
-        hilliness: f64,
+        hills: f64,
+        climb: f64,
+        cruise: f64,
     ) -> Self {
-        let n = (length_m / STEP_M) as usize + 400;
-        let (mut grade, mut curvature, mut limit) = (Vec::new(), Vec::new(), Vec::new());
+        let n = (length_m / CELL_M) as usize + 500;
+        let mut grade = Vec::with_capacity(n);
         while grade.len() < n {
-            let cells = between(rng, 300.0, 1500.0) / STEP_M;
-            let g = (hilliness * normal(rng)).clamp(-0.055, 0.055);
-            grade.extend(std::iter::repeat_n(g, cells as usize));
+            let g = (climb + 1.35 * hills * normal(rng)).clamp(-0.052, 0.052);
+            grade.extend(std::iter::repeat_n(g, (between(rng, 250.0, 2600.0) / CELL_M) as usize));
         }
+        let mut curvature = Vec::with_capacity(n);
         while curvature.len() < n {
-            let straight = between(rng, 100.0, 900.0) / STEP_M;
-            curvature.extend(std::iter::repeat_n(0.0, straight as usize));
-            let radius = between(rng, 0.0, 1.0).mul_add(between(rng, 0.0, 1800.0), 380.0);
-            let side = if rng.random::<bool>() { 1.0 } else { -1.0 };
-            let arc = between(rng, 0.15, 0.9) * radius / STEP_M;
-            curvature.extend(std::iter::repeat_n(side / radius, (arc as usize).clamp(20, 300)));
+            let straight = between(rng, 40.0, 700.0);
+            curvature.extend(std::iter::repeat_n(0.0, (straight / CELL_M) as usize));
+            let bend = sign(rng) * between(rng, 0.0004, 0.0026);
+            let arc = (between(rng, 0.1, 0.9) / bend.abs()).clamp(100.0, 700.0);
+            curvature.extend(std::iter::repeat_n(bend, (arc / CELL_M) as usize));
         }
-        while limit.len() < n {
-            let slow = rng.random::<f64>() < 0.35;
-            let v = if slow { between(rng, 5.0, 14.0) } else { between(rng, 17.5, 24.3) };
-            let length = if slow { between(rng, 80.0, 400.0) } else { between(rng, 800.0, 3000.0) };
-            limit.extend(std::iter::repeat_n(v, (length / STEP_M) as usize));
+        let mut speed = Vec::with_capacity(n);
+        while speed.len() < n {
+            let slow = rng.random::<f64>() < 0.45;
+            let (v, length) = if slow {
+                (cruise * between(rng, 0.25, 0.7), between(rng, 150.0, 900.0))
+            } else {
+                (cruise * between(rng, 0.72, 1.0), between(rng, 500.0, 2500.0))
+            };
+            speed.extend(std::iter::repeat_n(v, (length / CELL_M) as usize));
         }
-        let (grade, curvature) = (smooth(&grade[..n], 12), smooth(&curvature[..n], 8));
-        let mut altitude = vec![start_altitude_m];
-        for g in &grade {
-            altitude.push(altitude[altitude.len() - 1] + STEP_M * g / (1.0 + g * g).sqrt());
-        }
-        Self { grade, curvature, limit: limit[..n].to_vec(), altitude }
+        grade.truncate(n);
+        curvature.truncate(n);
+        speed.truncate(n);
+        let grade = mean(&mean(&grade, 45), 25);
+        Self { grade, curvature: mean(&curvature, 10), speed }
     }
 
     fn at(table: &[f64], s_m: f64) -> f64 {
-        let x = (s_m / STEP_M).clamp(0.0, (table.len() - 2) as f64);
+        let x = (s_m / CELL_M).clamp(0.0, (table.len() - 2) as f64);
         let i = x as usize;
         table[i] + (x - i as f64) * (table[i + 1] - table[i])
     }
@@ -94,18 +85,13 @@ impl Road {
         Self::at(&self.curvature, s_m)
     }
 
-    /// m above sea.
-    pub(crate) fn altitude(&self, s_m: f64) -> f64 {
-        Self::at(&self.altitude, s_m)
-    }
-
-    /// Speed that the driver may reach at `s_m` if he brakes in time for what follows, m/s.
-    pub(crate) fn target(&self, s_m: f64, decel_m_s2: f64) -> f64 {
-        let from = (s_m / STEP_M).max(0.0) as usize;
-        (from..(from + 60).min(self.limit.len()))
+    /// Speed at which the driver wants to be at `s_m` who slows by `decel` for what he sees, m/s.
+    pub(crate) fn wanted(&self, s_m: f64, decel: f64) -> f64 {
+        let from = (s_m / CELL_M).max(0.0) as usize;
+        (from..(from + 70).min(self.speed.len()))
             .map(|i| {
-                let ahead = (i as f64 * STEP_M - s_m).max(0.0);
-                (self.limit[i] * self.limit[i] + 2.0 * decel_m_s2 * ahead).sqrt()
+                let ahead = (i as f64 * CELL_M - s_m).max(0.0);
+                (self.speed[i] * self.speed[i] + 2.0 * decel * ahead).sqrt()
             })
             .fold(f64::INFINITY, f64::min)
     }
