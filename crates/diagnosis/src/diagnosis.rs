@@ -108,6 +108,9 @@ pub struct NotObservable {
     pub id: &'static str,
     /// Why.
     pub why: String,
+    /// Columns without which it cannot be seen, if it is these.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missing_channels: Vec<&'static str>,
 }
 
 /// A figure before and after the extension.
@@ -344,7 +347,7 @@ fn observable(problem: &Problem<'_>, options: &Options) -> (Vec<usize>, Vec<NotO
         } else {
             format!("channels are missing: {}", missing.join(", "))
         };
-        not.push(NotObservable { id: h.id, why });
+        not.push(NotObservable { id: h.id, why, missing_channels: missing });
     }
     not.retain(|n| !open.iter().any(|i| CATALOGUE[*i].id == n.id));
     not.dedup_by(|a, b| a.id == b.id);

@@ -55,6 +55,12 @@ pub enum DiagnosisError {
         /// Time of that row, s.
         after_s: f64,
     },
+    /// A cause that the catalogue does not have.
+    #[error("{} is not a cause of the catalogue", if id.is_empty() { "nothing" } else { id.as_str() })]
+    Cause {
+        /// The id, empty if none was given.
+        id: String,
+    },
     /// A drive is too short to say anything.
     #[error("drive {drive}: {seconds:.1} s of usable data, at least {needed_s:.0} s are needed")]
     TooShort {

@@ -221,7 +221,9 @@ pub fn extend(
                 set.extend(values);
                 extended = next;
             }
-            Err(why) => not_carried.push(NotObservable { id: cause.id, why }),
+            Err(why) => {
+                not_carried.push(NotObservable { id: cause.id, why, missing_channels: Vec::new() })
+            }
         }
     }
     let overlay = (!set.is_empty()).then(|| Overlay {

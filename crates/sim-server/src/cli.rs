@@ -22,6 +22,9 @@ pub(crate) enum Command {
     Plan(Box<cmd::plan::Args>),
     /// Finds what the simulation gets wrong on measured drives, and why.
     Diagnose(Box<cmd::diagnose::Args>),
+    /// Plans measurements: which manoeuvres tell causes apart.
+    #[command(subcommand)]
+    Experiment(cmd::experiment::Command),
     /// Drives traffic alone, compares it with recordings, calibrates its drivers.
     Traffic(Box<cmd::traffic::Args>),
     /// Checks road maps.

@@ -143,3 +143,24 @@ fn a_recording_is_reproduced_in_open_loop_and_the_accuracy_is_defined() {
     let refused = refused(&["replay", "--truck", "reference", "--drives", &missing, "--out", &out]);
     assert!(refused.contains("none"), "{refused}");
 }
+
+#[test]
+fn an_experiment_is_suggested_for_what_a_diagnosis_leaves_open() {
+    let folder = tempfile::tempdir().unwrap();
+    let diagnosis = folder.path().join("diagnosis.json");
+    let open = r#"{"causes": [{"id": "brake_gain", "confused_with": []}],
+        "not_observable": [{"id": "brake_fade", "why": "no braking above 150 degC"},
+            {"id": "crosswind", "why": "...", "missing_channels": ["yaw_rate_rad_s"]}]}"#;
+    std::fs::write(&diagnosis, open).unwrap();
+    let (file, out) = (text(&diagnosis), text(&folder.path().join("out")));
+    let given = ["experiment", "suggest", "--truck", "reference", "--diagnosis", &file];
+    let found = diagnosed(&[&given[..], &["--out", &out, "--json"]].concat());
+    assert_eq!(found["causes"], serde_json::json!(["brake_gain", "brake_fade"]));
+    assert_eq!(found["plan"][0]["manoeuvre"], "hot_brakes", "{found}");
+    assert!(folder.path().join("out/experiment.json").is_file());
+
+    let wrong = ["experiment", "suggest", "--truck", "reference", "--causes", "flux"];
+    assert!(refused(&[&wrong[..], &["--out", &out]].concat()).contains("flux"));
+    std::fs::write(&diagnosis, "{}").unwrap();
+    assert!(refused(&[&given[..], &["--out", &out]].concat()).contains("causes"));
+}

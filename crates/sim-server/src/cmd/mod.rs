@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub(crate) mod diagnose;
+pub(crate) mod experiment;
 pub(crate) mod map;
 pub(crate) mod plan;
 pub(crate) mod recover;
@@ -21,6 +22,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Plan(args)) => plan::run(&args),
         Some(Command::Diagnose(args)) => diagnose::run(&args),
+        Some(Command::Experiment(command)) => experiment::run(&command),
         Some(Command::Traffic(args)) => traffic::run(&args),
         Some(Command::Map(command)) => map::run(command),
         Some(Command::Replay(args)) => replay::run(&args),

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use diagnosis::Executor;
+use diagnosis::logger::Draw;
 use dynamics::catalogue::{Cause, Estimate, cause};
 use dynamics::{Overlay, TruckModel, TruckParameters};
 use road::Road;
@@ -16,7 +17,7 @@ use serde::Serialize;
 use sim::{Scenario, Status, TrafficKind, World};
 
 use super::folder;
-use super::logger::{Draw, drive};
+use super::logger::drive;
 use super::threads::Threads;
 use crate::failure::Failure;
 use crate::provenance::Provenance;

@@ -1,7 +1,7 @@
 //! Our own recordings as measured drives: `run.mcap` to a folder of drives.
 //!
 //! A recording holds the true state of the simulated truck; the drive holds what a logger would
-//! make of it (see [`super::logger`]). GPS speed, accelerometer, coolant and the road's curvature are
+//! make of it (see [`diagnosis::logger`]). GPS speed, accelerometer, coolant and the road's curvature are
 //! not in a recording.
 
 use std::collections::BTreeMap;
@@ -9,12 +9,13 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use diagnosis::Channel;
+use diagnosis::logger::{Draw, as_logged};
 use dynamics::{TruckModel, TruckParameters};
 use mcap::records::{Record, op};
 use sim::Scenario;
 
 use super::folder::{STEP_S, Table};
-use super::logger::{Draw, as_logged};
 use crate::failure::Failure;
 use crate::recording::Layout;
 use crate::recording::recover::{Records, attachment_is_whole};
@@ -246,7 +247,11 @@ impl Reader {
             fuel,
             grade.tan(),
         ];
-        as_logged(&COLUMNS, &mut row, &mut self.draw);
+        for (column, x) in COLUMNS.iter().zip(&mut row) {
+            if let Some(channel) = Channel::of(column) {
+                *x = as_logged(channel, *x, &mut self.draw);
+            }
+        }
         self.table.push(&row);
     }
 }

@@ -147,6 +147,17 @@ impl Results {
             ));
             lines.push(closed_loop.sentence());
         }
+        let open = found.causes.iter().any(|c| !c.confused_with.is_empty());
+        if open {
+            let json = out.join("diagnosis.json");
+            lines.push(format!(
+                "What to drive to tell them apart: sim-server experiment suggest --truck {} \
+                 --diagnosis {} --out {}",
+                found.truck,
+                json.display(),
+                out.display()
+            ));
+        }
         lines.push(format!("Report: {}", out.join("report.html").display()));
         lines.join("\n")
     }
