@@ -4,7 +4,7 @@ use crate::Drive;
 use crate::Plant;
 use crate::param::Theta;
 use crate::problem::replay;
-use crate::replay::force::{Longitudinal, Slow};
+use crate::replay::force::Longitudinal;
 use crate::replay::{Module, Prepared, fuel_noise_g_s};
 
 /// Length of a rollout, s.
@@ -43,13 +43,12 @@ pub(crate) fn drive_error_by(
         let model = Longitudinal::new(d, plant, theta);
         let steps = (HORIZON_S / Drive::STEP_S) as usize;
         let mut start = 0;
-        let mut slow = Slow::default();
         let scale = 1.0 / (1.0 + theta[crate::param::P::SpeedScale as usize]);
         while start + steps < d.n {
             let mut v = d.speed[start];
             for i in start..start + steps {
                 let moving = d.engaged[i] && d.speed[i] > 3.0;
-                let a = model.acceleration(i, v.max(0.5) * scale, &mut slow);
+                let [a] = model.acceleration(i, &[v.max(0.5) * scale]);
                 v += if moving { a * Drive::STEP_S / scale } else { d.speed[i + 1] - d.speed[i] };
                 v = v.clamp(0.0, 60.0);
                 let error = v - d.speed[i + 1];

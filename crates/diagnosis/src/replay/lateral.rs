@@ -5,8 +5,8 @@ use dynamics::lateral::{LateralParameters, StateSpace, YawSideslip};
 use tractrix_core::GRAVITY_M_S2;
 
 use super::Module as M;
-use super::force::air_speed;
-use super::prepared::{Prepared, at_index};
+use super::force::side_force;
+use super::prepared::Prepared;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -32,14 +32,23 @@ fn stiffness(d: &Prepared, plant: &Plant, t: &Theta) -> [f64; dynamics::lateral:
     p.tyres.stiffness_n_rad(&p.static_axle_load_n())
 }
 
-/// `A(v) = constant + inverse / v + linear v`, exactly.
+/// Lateral velocity, yaw rates of tractor and trailer, articulation.
+type State = [f64; 4];
+
+/// `x + y h`, element by element.
+#[inline(always)]
+fn plus(x: &State, y: &State, h: f64) -> State {
+    core::array::from_fn(|i| x[i] + y[i] * h)
+}
+
+/// `A(v) = constant + inverse / v + linear v`, exactly; by columns.
 struct BySpeed {
-    constant: [[f64; 4]; 4],
-    inverse: [[f64; 4]; 4],
-    linear: [[f64; 4]; 4],
-    steer: [f64; 4],
-    tractor: [f64; 4],
-    trailer: [f64; 4],
+    constant: [State; 4],
+    inverse: [State; 4],
+    linear: [State; 4],
+    steer: State,
+    tractor: State,
+    trailer: State,
 }
 
 impl BySpeed {
@@ -60,26 +69,40 @@ impl BySpeed {
                 let (a, b, e) = (x.a[i][j], y.a[i][j], z.a[i][j]);
                 let inverse = (8.0 * a - 12.0 * b + 4.0 * e) / 3.0;
                 let linear = b - a + 0.5 * inverse;
-                out.inverse[i][j] = inverse;
-                out.linear[i][j] = linear;
-                out.constant[i][j] = a - inverse - linear;
+                out.inverse[j][i] = inverse;
+                out.linear[j][i] = linear;
+                out.constant[j][i] = a - inverse - linear;
             }
         }
         out
     }
 
-    fn at(&self, v: f64) -> [[f64; 4]; 4] {
+    #[inline(always)]
+    fn at(&self, v: f64) -> [State; 4] {
         let w = 1.0 / v;
-        core::array::from_fn(|i| {
-            core::array::from_fn(|j| {
-                self.constant[i][j] + self.inverse[i][j] * w + self.linear[i][j] * v
-            })
+        core::array::from_fn(|j| {
+            plus(&plus(&self.constant[j], &self.inverse[j], w), &self.linear[j], v)
         })
     }
 }
 
-/// Residuals of tractor yaw rate, trailer yaw rate and lateral acceleration, mean of two samples.
-pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3] {
+/// `A s + u`.
+#[inline(always)]
+fn rate(a: &[State; 4], s: &State, u: &State) -> State {
+    let left = plus(&plus(u, &a[0], s[0]), &a[1], s[1]);
+    let right: State = core::array::from_fn(|i| a[2][i] * s[2] + a[3][i] * s[3]);
+    plus(&left, &right, 1.0)
+}
+
+/// Tractor yaw rate, trailer yaw rate and lateral acceleration of every sample, without the
+/// instruments' offsets.
+struct Motion {
+    yaw: Vec<f64>,
+    trailer_yaw: Vec<f64>,
+    accel_y: Vec<f64>,
+}
+
+fn motion(d: &Prepared, plant: &Plant, t: &Theta, samples: usize) -> Motion {
     let p = loaded(d, plant, t);
     let mut model = YawSideslip::new(&p);
     model.stiffness_n_rad = stiffness(d, plant, t);
@@ -88,69 +111,64 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
         *c *= 1.0 + scale[[0, 1, 1, 2, 2, 2][axle]];
     }
     let system = BySpeed::new(&model);
-    let (tractor_kg, trailer_kg) = (model.tractor_mass_kg, model.trailer_mass_kg);
     let road_wheel = road_wheel(d, plant, t);
-    let wind = [t[P::WindX as usize], t[P::WindY as usize]];
-    let blows = wind != [0.0, 0.0] || t[P::Crosswind as usize] != 0.0;
-    let bank = t[P::Bank as usize];
+    let bank_m_s2 = GRAVITY_M_S2 * t[P::Bank as usize];
+    // The bank pulls on both bodies, and the wind pushes them in a fixed proportion.
+    let bank = plus(
+        &system.tractor.map(|b| -model.tractor_mass_kg * bank_m_s2 * b),
+        &system.trailer,
+        -model.trailer_mass_kg * bank_m_s2,
+    );
+    let share = plant.side_force_tractor_frac;
+    let wind = plus(&system.tractor.map(|b| share * b), &system.trailer, 1.0 - share);
+    let side_force = side_force(d, plant, t);
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     let dt = Drive::STEP_S;
-    let rows = (d.n / 2).saturating_sub(2);
-    let mut out = [vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]];
-    let mut s = [0.0_f64; 4];
-    for i in 0..2 * rows {
-        let v = (d.speed[i] * speed_scale).max(MIN_SPEED_M_S);
+    let mut out = Motion {
+        yaw: Vec::with_capacity(samples),
+        trailer_yaw: Vec::with_capacity(samples),
+        accel_y: Vec::with_capacity(samples),
+    };
+    let mut s: State = [0.0; 4];
+    for ((i, speed), wheel) in (0..samples).zip(&d.speed).zip(road_wheel.windows(2)) {
+        let v = (speed * speed_scale).max(MIN_SPEED_M_S);
         let a = system.at(v);
-        let (mut side_tractor, mut side_trailer) =
-            (-tractor_kg * GRAVITY_M_S2 * bank, -trailer_kg * GRAVITY_M_S2 * bank);
-        if blows {
-            let (along, across) = air_speed(d, t, wind, i, v);
-            let yaw_deg = (across / along.max(1.0)).atan().to_degrees();
-            let force = 0.5
-                * d.density[i]
-                * (along * along + across * across)
-                * plant.side_area_m2_per_deg
-                * yaw_deg;
-            side_tractor += plant.side_force_tractor_frac * force;
-            side_trailer += (1.0 - plant.side_force_tractor_frac) * force;
-        }
-        let input = |delta: f64| -> [f64; 4] {
-            core::array::from_fn(|k| {
-                system.steer[k] * delta
-                    + system.tractor[k] * side_tractor
-                    + system.trailer[k] * side_trailer
-            })
-        };
-        let rate = |s: &[f64; 4], u: &[f64; 4]| -> [f64; 4] {
-            core::array::from_fn(|k| {
-                a[k][0] * s[0] + a[k][1] * s[1] + a[k][2] * s[2] + a[k][3] * s[3] + u[k]
-            })
-        };
-        let (d0, d1) = (road_wheel[i], road_wheel[i + 1]);
-        let (u0, um, u1) = (input(d0), input(0.5 * (d0 + d1)), input(d1));
-        let k1 = rate(&s, &u0);
-        let k = i / 2;
-        out[0][k] += 0.5 * (d.yaw[i] - s[1] - t[P::YawBias as usize]);
-        out[1][k] += 0.5 * (d.trailer_yaw[i] - s[2] - t[P::TrailerYawBias as usize]);
-        let lateral = k1[0] + v * s[1] + GRAVITY_M_S2 * bank + t[P::AccelYBias as usize];
-        out[2][k] += 0.5 * (d.accel_y[i] - lateral);
-        let step = |k: &[f64; 4], h: f64| -> [f64; 4] { core::array::from_fn(|j| s[j] + h * k[j]) };
-        let k2 = rate(&step(&k1, 0.5 * dt), &um);
-        let k3 = rate(&step(&k2, 0.5 * dt), &um);
-        let k4 = rate(&step(&k3, dt), &u1);
-        for j in 0..4 {
-            s[j] += dt / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]);
-            s[j] = s[j].clamp(-50.0, 50.0);
-        }
-    }
-    for (m, r) in [M::Yaw, M::TrailerYaw, M::AccelY].iter().zip(&mut out) {
-        for (x, ok) in r.iter_mut().zip(&d.valid[*m as usize]) {
-            if !ok {
-                *x = 0.0;
-            }
-        }
+        let side = side_force.as_ref().map_or(bank, |f| plus(&bank, &wind, f[i]));
+        let input = |delta: f64| plus(&side, &system.steer, delta);
+        let (u0, u1) = (input(wheel[0]), input(wheel[1]));
+        let um = input(0.5 * (wheel[0] + wheel[1]));
+        let k1 = rate(&a, &s, &u0);
+        out.yaw.push(s[1]);
+        out.trailer_yaw.push(s[2]);
+        out.accel_y.push(k1[0] + v * s[1] + bank_m_s2);
+        let k2 = rate(&a, &plus(&s, &k1, 0.5 * dt), &um);
+        let k3 = rate(&a, &plus(&s, &k2, 0.5 * dt), &um);
+        let k4 = rate(&a, &plus(&s, &k3, dt), &u1);
+        let sum: State = core::array::from_fn(|j| k1[j] + 2.0 * (k2[j] + k3[j]) + k4[j]);
+        s = plus(&s, &sum, dt / 6.0).map(|x| x.clamp(-50.0, 50.0));
     }
     out
+}
+
+/// Residuals of tractor yaw rate, trailer yaw rate and lateral acceleration, mean of two samples.
+pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3] {
+    let rows = (d.n / 2).saturating_sub(2);
+    let motion = motion(d, plant, t, 2 * rows);
+    [
+        (M::Yaw, &d.yaw, &motion.yaw, P::YawBias),
+        (M::TrailerYaw, &d.trailer_yaw, &motion.trailer_yaw, P::TrailerYawBias),
+        (M::AccelY, &d.accel_y, &motion.accel_y, P::AccelYBias),
+    ]
+    .map(|(m, measured, modelled, bias)| {
+        let mut out = vec![0.0; rows];
+        let pairs = measured.chunks_exact(2).zip(modelled.chunks_exact(2));
+        for ((x, ok), (a, b)) in out.iter_mut().zip(&d.valid[m as usize]).zip(pairs) {
+            if *ok {
+                *x = 0.5 * (a[0] + a[1] - b[0] - b[1]) - t[bias as usize];
+            }
+        }
+        out
+    })
 }
 
 /// Road-wheel angle of every sample: dead time, free play, offset, ratio, lag.
@@ -163,9 +181,9 @@ fn road_wheel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let play = 0.5 * (steering.free_play_rad + t[P::FreePlay as usize]).max(0.0);
     let mut gear = d.steer[0];
     let mut angle = (gear - offset) / ratio;
-    (0..d.n)
-        .map(|i| {
-            let wheel = at_index(&d.steer, i as f64);
+    d.steer
+        .iter()
+        .map(|wheel| {
             gear = gear.clamp(wheel - play, wheel + play);
             let target = (gear - offset) / ratio;
             angle = target + (angle - target) * keep;

@@ -10,6 +10,7 @@ pub(crate) mod force;
 mod lateral;
 mod powertrain;
 mod prepared;
+mod profiles;
 mod sensors;
 
 pub(crate) use powertrain::noise_g_s as fuel_noise_g_s;
@@ -172,7 +173,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::SpeedLag
         | P::PressureLag
         | P::FanWidth => &[G::Force],
-        P::WindX | P::WindY => &[G::Force, G::Lateral],
+        P::WindX | P::WindY | P::Crosswind => &[G::Force, G::Lateral],
         P::Mass => &[G::Force, G::Lateral],
         P::GradeBias | P::MapShift => &[G::Force, G::Altitude, G::Imu],
         P::Altitude
@@ -199,13 +200,24 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::PayloadX
         | P::StiffnessFollows
         | P::Bank
-        | P::Crosswind
         | P::AccelYBias
         | P::TrailerYawBias => &[G::Lateral],
         P::GpsLag => &[G::Gps],
         P::ImuBias => &[G::Imu],
         P::AltitudeOffset => &[G::Altitude],
         P::HeadingOffset => &[G::Heading],
+    }
+}
+
+/// The module whose output a parameter is simply added to.
+pub(crate) fn offset_of(p: P) -> Option<Module> {
+    match p {
+        P::YawBias => Some(M::Yaw),
+        P::TrailerYawBias => Some(M::TrailerYaw),
+        P::AccelYBias => Some(M::AccelY),
+        P::AltitudeOffset => Some(M::Altitude),
+        P::HeadingOffset => Some(M::Heading),
+        _ => None,
     }
 }
 

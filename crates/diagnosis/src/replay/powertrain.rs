@@ -4,6 +4,7 @@ use tractrix_core::RPM_PER_RAD_S;
 
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
+use super::profiles::Kind;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -15,6 +16,10 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let keep = |lag: f64| (-Drive::STEP_S / lag).exp();
     let (slow, fast) = (keep(boost_lag), keep(plant.torque_lag_s[1]));
     let percent = 100.0 / plant.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
+    let pedal = d.profiles.get(Kind::Pedal, [delay, 0.0], || {
+        (0..d.n).map(|i| at_index(&d.pedal, i as f64 - delay)).collect()
+    });
+    let derates = [P::Altitude, P::HeatAir, P::HeatCoolant].map(|p| t[p as usize]) != [0.0; 3];
     let mut out = vec![0.0; valid.len()];
     let mut torque = 0.0;
     let mut running = false;
@@ -29,9 +34,9 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 running = true;
             }
             let n = d.rpm[i];
-            let full = plant.full_load_nm.at(n) * derate(d, t, i);
+            let full = d.full_load[i] * if derates { derate(d, t, i) } else { 1.0 };
             let friction = plant.friction_nm[0] + plant.friction_nm[1] * n;
-            let demand = at_index(&d.pedal, i as f64 - delay) * (full + friction);
+            let demand = pedal[i] * (full + friction);
             let boosting = demand > torque && torque > plant.boost_from_frac * full;
             let keep = if boosting { slow } else { fast };
             torque = demand + (torque - demand) * keep;
@@ -70,9 +75,21 @@ pub(super) fn shift(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
 pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Fuel as usize];
     let lag = t[P::FuelLag as usize] / Drive::STEP_S;
+    let torque = |i: usize| {
+        let percent = at_index(&d.torque, i as f64 - lag);
+        (percent * 0.01 * plant.reference_torque_nm).max(0.0)
+    };
+    let rpm = |i: usize| at_index(&d.rpm, i as f64 - lag);
     let [a, b, c] = plant.fuel;
-    let low_load = 0.3 * t[P::FuelLowLoad as usize].exp();
-    let low = t[P::FuelLow as usize];
+    let rate = d.profiles.get(Kind::Willans, [lag, 0.0], || {
+        let rate = |i| a + b * rpm(i) + c * torque(i) * rpm(i) / RPM_PER_RAD_S * 1e-3;
+        (0..d.n).map(rate).collect()
+    });
+    let load = d.profiles.get(Kind::Load, [lag, 0.0], || {
+        (0..d.n).map(|i| torque(i) / plant.full_load_nm.at(rpm(i)).max(1.0)).collect()
+    });
+    let (scale, low) = (1.0 + t[P::FuelScale as usize], t[P::FuelLow as usize]);
+    let per_load = 1.0 / (0.3 * t[P::FuelLowLoad as usize].exp());
     valid
         .iter()
         .enumerate()
@@ -82,18 +99,9 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
             }
             let (mut measured, mut modelled) = (0.0, 0.0);
             for i in 4 * k..4 * k + 4 {
+                let extra = low * (1.0 - load[i] * per_load).max(0.0);
                 measured += 0.25 * d.fuel[i];
-                let x = i as f64 - lag;
-                let torque = at_index(&d.torque, x) * 0.01 * plant.reference_torque_nm;
-                let torque = torque.max(0.0);
-                let n = at_index(&d.rpm, x);
-                let power_kw = torque * n / RPM_PER_RAD_S * 1e-3;
-                let mut rate = (a + b * n + c * power_kw) * (1.0 + t[P::FuelScale as usize]);
-                if low != 0.0 {
-                    let load = torque / plant.full_load_nm.at(n).max(1.0);
-                    rate *= 1.0 + low * (1.0 - load / low_load).max(0.0);
-                }
-                modelled += 0.25 * rate;
+                modelled += 0.25 * rate[i] * scale * (1.0 + extra);
             }
             (measured - modelled) / noise_g_s(measured)
         })

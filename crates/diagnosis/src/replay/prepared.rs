@@ -2,6 +2,8 @@
 
 use tractrix_core::{GAS_CONSTANT_AIR_J_KG_K, GRAVITY_M_S2};
 
+use super::force::Inputs;
+use super::profiles::Profiles;
 use super::{MODULES, Module as M};
 use crate::{Channel as C, Drive, Plant};
 
@@ -41,6 +43,10 @@ pub(crate) struct Prepared {
     pub(crate) curvature: Vec<f64>,
     pub(crate) s_map: Vec<f64>,
     pub(crate) grade_by_s: GradeBySection,
+    /// Full-load torque at the engine speed of every sample, Nm.
+    pub(super) full_load: Vec<f64>,
+    pub(super) balance: Inputs,
+    pub(super) profiles: Profiles,
     /// Closed driveline without a shift near, per sample.
     pub(crate) engaged: Vec<bool>,
     /// Shifts as (first sample, number of samples).
@@ -154,6 +160,9 @@ impl Prepared {
             coolant: get(C::CoolantTempDegc, 80.0),
             curvature: get(C::Curvature1M, 0.0),
             grade_by_s: GradeBySection::new(&s_map, &grade),
+            full_load: rpm.iter().map(|n| plant.full_load_nm.at(*n)).collect(),
+            balance: Inputs::default(),
+            profiles: Profiles::default(),
             speed,
             rpm,
             gear,
@@ -169,6 +178,7 @@ impl Prepared {
         };
         d.mask(plant);
         d.fine_pressure = super::brake::resolved(&d, plant);
+        d.balance = Inputs::new(&d, plant);
         d
     }
 

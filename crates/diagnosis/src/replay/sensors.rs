@@ -20,10 +20,9 @@ pub(super) fn gps(d: &Prepared, t: &Theta) -> Vec<f64> {
 /// Altitude minus the integral of the map's grade, m, mean over a second.
 pub(super) fn altitude(d: &Prepared, t: &Theta) -> Vec<f64> {
     let scale = Drive::STEP_S / (1.0 + t[P::SpeedScale as usize]);
-    let shift = t[P::MapShift as usize];
+    let map = d.grade_shifted(t[P::MapShift as usize]);
     let climb = running_sum((0..d.n).map(|i| {
-        let grade = if shift == 0.0 { d.grade[i] } else { d.grade_by_s.at(d.s_map[i] + shift) }
-            + t[P::GradeBias as usize];
+        let grade = map[i] + t[P::GradeBias as usize];
         grade / (1.0 + grade * grade).sqrt() * d.speed[i] * scale
     }));
     let start = d.altitude.iter().take(20).sum::<f64>() / d.altitude.len().min(20) as f64;
@@ -46,10 +45,9 @@ pub(super) fn heading(d: &Prepared, t: &Theta) -> Vec<f64> {
 
 /// Integral of the accelerometer minus gravity's part minus the change of speed, m/s per second.
 pub(super) fn imu(d: &Prepared, t: &Theta) -> Vec<f64> {
-    let shift = t[P::MapShift as usize];
+    let map = d.grade_shifted(t[P::MapShift as usize]);
     let sum = running_sum((0..d.n).map(|i| {
-        let grade = if shift == 0.0 { d.grade[i] } else { d.grade_by_s.at(d.s_map[i] + shift) }
-            + t[P::GradeBias as usize];
+        let grade = map[i] + t[P::GradeBias as usize];
         (d.accel_x[i] - t[P::ImuBias as usize] - Prepared::gravity_along(grade)) * Drive::STEP_S
     }));
     let scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);

@@ -85,6 +85,20 @@ impl Whitener {
         }
         out
     }
+
+    /// A whitened record through the adjoint of the filter: its product with any record that is
+    /// zero where masked is that of the whitened ones. `x` is zero where masked.
+    pub(crate) fn adjoint(&self, x: &[f64]) -> Vec<f64> {
+        let scale = 1.0 / self.sigma;
+        let mut out = x.to_vec();
+        for (lag, a) in self.coefficients.iter().enumerate() {
+            for (y, x) in out.iter_mut().zip(x.iter().skip(lag + 1)) {
+                *y -= a * x;
+            }
+        }
+        out.iter_mut().for_each(|y| *y *= scale);
+        out
+    }
 }
 
 #[cfg(test)]

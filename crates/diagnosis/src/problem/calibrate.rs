@@ -1,0 +1,231 @@
+//! What drives that are in order teach: common calibration, scatter of the tolerances, noise.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::nuisance::Changed;
+use super::{Direction, Problem, Reference, nuisance_directions, replay};
+use crate::DiagnosisError;
+use crate::param::{P, PARAMS, SPECS, Theta};
+use crate::replay::{MODULES, Module, Prepared, Residuals};
+use crate::stats::whiten::Whitener;
+
+/// Drives' worth of the expected scatter that the baseline has to outweigh, and rounds of the
+/// iteration.
+const SCATTER_PRIOR: f64 = 2.0;
+/// Spread of a tolerance's mean, in its scatter.
+const MEAN_PRIOR: f64 = 0.7;
+const SCATTER_ROUNDS: usize = 25;
+
+impl Reference {
+    pub(super) fn start(drives: &[Prepared], residuals: &[Residuals], theta: Theta) -> Self {
+        let mut tolerance = [0.0; PARAMS];
+        for (t, s) in tolerance.iter_mut().zip(&SPECS) {
+            *t = s.scatter();
+        }
+        let whiteners = fit_whiteners(drives, residuals, true);
+        Self {
+            theta,
+            tolerance,
+            whiteners,
+            ratio: [1.0; MODULES],
+            settled: [1.0; MODULES],
+            free_form: [0.0; MODULES],
+        }
+    }
+}
+
+pub(super) fn fit_whiteners(
+    drives: &[Prepared],
+    residuals: &[Residuals],
+    white: bool,
+) -> Vec<Whitener> {
+    Module::ALL
+        .iter()
+        .map(|m| {
+            let i = *m as usize;
+            let records = drives
+                .iter()
+                .zip(residuals)
+                .filter(|(d, _)| d.available[i])
+                .map(|(d, r)| (r[i].as_slice(), d.valid[i].as_slice()));
+            let fitted = Whitener::fit(records, if white { 0 } else { order(*m) });
+            let mut w = fitted.unwrap_or_else(|| Whitener::white(1.0));
+            w.sigma = w.sigma.max(floor(*m));
+            w
+        })
+        .collect()
+}
+
+/// Resolution of the channels: noise is never assumed smaller.
+fn floor(m: Module) -> f64 {
+    match m {
+        Module::Force | Module::Imu | Module::Gps => 1e-3,
+        Module::Torque => 0.2,
+        Module::Fuel => 0.05,
+        Module::Brake => 0.3,
+        Module::Shift => 0.02,
+        Module::Yaw | Module::TrailerYaw | Module::Heading => 5e-5,
+        Module::AccelY | Module::Altitude => 1e-2,
+    }
+}
+
+fn order(m: Module) -> usize {
+    match m {
+        Module::Shift => 0,
+        Module::Force | Module::Imu => 8,
+        _ => 6,
+    }
+}
+
+impl Problem<'_> {
+    /// Mean and scatter of every tolerance between the drives by expectation-maximisation, with
+    /// [`SCATTER_PRIOR`] drives' worth of the scatter that is expected and a prior for the mean. The
+    /// mean is what this truck and its weather are like when all is well (a crosswind of any sign
+    /// adds drag): causes count from there.
+    pub(super) fn scatter(&mut self) {
+        let specs: Vec<&crate::param::Spec> =
+            nuisance_directions(&self.reference.tolerance).iter().map(|d| d.p.spec()).collect();
+        let systems: Vec<(DMatrix<f64>, DVector<f64>)> = (0..self.drives.len())
+            .map(|i| {
+                let n = &self.nuisance[i];
+                (n.scaled(), self.against(i, &n.base))
+            })
+            .collect();
+        let count = self.drives.len() as f64;
+        // Means and variances in units of what the columns are scaled with.
+        let mut variance = vec![1.0; specs.len()];
+        let mut mean = DVector::<f64>::zeros(specs.len());
+        for _ in 0..SCATTER_ROUNDS {
+            let mut first = DVector::<f64>::zeros(specs.len());
+            let mut second = vec![0.0; specs.len()];
+            for (a, b) in &systems {
+                let (mut a, mut b) = (a.clone(), b.clone());
+                for (j, v) in variance.iter().enumerate() {
+                    a[(j, j)] += 1.0 / v;
+                    b[j] += mean[j] / v;
+                }
+                let Some(factor) = a.cholesky() else { return };
+                let (z, spread) = (factor.solve(&b), factor.inverse());
+                for (j, s) in second.iter_mut().enumerate() {
+                    *s += (z[j] - mean[j]).powi(2) + spread[(j, j)];
+                }
+                first += z;
+            }
+            for (j, (v, s)) in variance.iter().zip(&specs).enumerate() {
+                let own = MEAN_PRIOR * s.scatter() / self.reference.tolerance[s.p as usize];
+                mean[j] = first[j] / (count + v / (own * own));
+            }
+            for ((v, second), s) in variance.iter_mut().zip(second).zip(&specs) {
+                let expected = (s.scatter() / self.reference.tolerance[s.p as usize]).powi(2);
+                let bound = match s.p {
+                    P::TurboLag | P::PedalDelay | P::TorqueReport => 2.0,
+                    _ => 10.0,
+                };
+                *v = ((SCATTER_PRIOR * expected + second) / (SCATTER_PRIOR + count))
+                    .min(bound * bound * expected);
+            }
+        }
+        for (j, (v, s)) in variance.iter().zip(&specs).enumerate() {
+            let i = s.p as usize;
+            let shift = mean[j] * self.reference.tolerance[i];
+            let x = &mut self.reference.theta[i];
+            *x = (*x + shift).clamp(s.lo, s.hi);
+            self.reference.tolerance[i] *= v.sqrt();
+        }
+    }
+
+    /// Raw residuals of a drive after its tolerances are taken out.
+    pub(super) fn without_nuisance(&self, i: usize, z: &[f64]) -> Residuals {
+        let d = &self.drives[i];
+        let mut t = self.reference.theta;
+        for (s, z) in nuisance_directions(&self.reference.tolerance).iter().zip(z) {
+            let x = &mut t[s.p as usize];
+            *x = (*x + z * self.reference.tolerance[s.p as usize])
+                .clamp(s.p.spec().lo, s.p.spec().hi);
+        }
+        replay(d, self.plant, &t)
+    }
+
+    /// One parameter after the other, in halving steps: delays of sampled signals have a kink at
+    /// every sample, where Gauss-Newton stops short.
+    fn creep(
+        &self,
+        theta: &mut Theta,
+        best: &mut f64,
+        free: &[&crate::param::Spec],
+        cost: &dyn Fn(f64, &Theta) -> f64,
+    ) {
+        for s in free.iter().filter(|s| s.unit == "s") {
+            let mut step = 0.02;
+            while step > 0.004 {
+                let mut moved = false;
+                for sign in [1.0, -1.0] {
+                    let mut t = *theta;
+                    let x = &mut t[s.p as usize];
+                    *x = (*x + sign * step).clamp(s.lo, s.hi);
+                    let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
+                    if c < *best {
+                        (*theta, *best, moved) = (t, c, true);
+                        break;
+                    }
+                }
+                if !moved {
+                    step *= 0.5;
+                }
+            }
+        }
+    }
+
+    /// Gauss-Newton steps of the common calibration.
+    pub(super) fn calibrate(&mut self, clean: bool, first: bool) -> Result<(), DiagnosisError> {
+        if !clean {
+            return Ok(());
+        }
+        let free: Vec<&crate::param::Spec> = SPECS.iter().filter(|s| s.calibration > 0.0).collect();
+        let directions: Vec<Direction> = free
+            .iter()
+            .map(|s| Direction { p: s.p, shape: Vec::new(), step: 0.3 * s.step })
+            .collect();
+        let cost = |norm: f64, t: &Theta| {
+            norm + free.iter().map(|s| (t[s.p as usize] / s.calibration).powi(2)).sum::<f64>()
+        };
+        let mut theta = self.reference.theta;
+        let (mut gram, _) = self.gram(&theta, &directions);
+        let mut best = cost(gram.sum(|_| true).2, &theta);
+        for _ in 0..if first { 4 } else { 2 } {
+            let (mut a, mut b, _) = gram.sum(|_| true);
+            for (j, s) in free.iter().enumerate() {
+                let precision = 1.0 / (s.calibration * s.calibration);
+                a[(j, j)] += precision;
+                b[j] -= precision * theta[s.p as usize];
+            }
+            let step = a
+                .cholesky()
+                .ok_or_else(|| DiagnosisError::Numerics("calibration".into()))?
+                .solve(&b);
+            let mut factor = 1.0;
+            let mut improved = false;
+            while !improved && factor > 0.05 {
+                let mut t = theta;
+                for (s, d) in free.iter().zip(step.iter()) {
+                    let x = &mut t[s.p as usize];
+                    *x = (*x + factor * d).clamp(s.lo, s.hi);
+                }
+                let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
+                if c < best {
+                    (theta, best, improved) = (t, c, true);
+                    gram = self.gram(&theta, &directions).0;
+                }
+                factor *= 0.4;
+            }
+            if !improved {
+                break;
+            }
+        }
+        if first {
+            self.creep(&mut theta, &mut best, &free, &cost);
+        }
+        self.reference.theta = theta;
+        self.rebuild(if first { Changed::Everything } else { Changed::Scatter })
+    }
+}

@@ -1,0 +1,171 @@
+//! Residuals, sensitivities and tolerances of a set of drives in one nuisance-marginal metric.
+//!
+//! Per drive `M = I - Z (I + Z'Z)^-1 Z'`, the columns of `Z` being the sensitivities to the
+//! tolerances of that drive (load sheet, weather, instruments), scaled by their standard
+//! deviations. Everything that the search needs is a Gram matrix in `M`, kept per drive.
+
+mod calibrate;
+mod gram;
+mod nuisance;
+mod signals;
+
+pub(crate) use gram::Gram;
+pub(crate) use nuisance::Rest;
+
+use calibrate::fit_whiteners;
+use nuisance::{Changed, Nuisance};
+use signals::Kept;
+
+use crate::param::{P, PARAMS, SPECS, Theta};
+use crate::replay::{GROUPS, MODULES, Prepared, Residuals, replay_group};
+use crate::stats::whiten::Whitener;
+use crate::{DiagnosisError, Executor, Plant};
+
+/// Tolerances, calibration and noise of a truck and its logger.
+#[derive(Debug, Clone)]
+pub(crate) struct Reference {
+    /// Common calibration, the zero of all causes.
+    pub(crate) theta: Theta,
+    /// Scatter between drives, per parameter; 0 where none.
+    pub(crate) tolerance: [f64; PARAMS],
+    pub(crate) whiteners: Vec<Whitener>,
+    /// Mean square of whitened residuals at the calibration, tolerances included, per module.
+    pub(crate) ratio: [f64; MODULES],
+    /// The same with the tolerances taken out.
+    pub(crate) settled: [f64; MODULES],
+    /// Evidence of the best free function per module on drives that are in order, nats per drive.
+    pub(crate) free_form: [f64; MODULES],
+}
+
+/// A set of drives ready for the search.
+pub(crate) struct Problem<'a> {
+    pub(crate) plant: &'a Plant,
+    pub(crate) drives: Vec<Prepared>,
+    pub(crate) reference: Reference,
+    nuisance: Vec<Nuisance>,
+    kept: Vec<Kept>,
+    executor: &'a dyn Executor,
+}
+
+/// A direction in parameter space: from `base`, a step of `step` along `p`.
+#[derive(Debug, Clone)]
+pub(crate) struct Direction {
+    pub(crate) p: P,
+    /// Shape parameters that hold while the direction is taken.
+    pub(crate) shape: Vec<(P, f64)>,
+    pub(crate) step: f64,
+}
+
+fn nuisance_directions(tolerance: &[f64; PARAMS]) -> Vec<Direction> {
+    SPECS
+        .iter()
+        .filter(|s| tolerance[s.p as usize] > 0.0)
+        .map(|s| Direction { p: s.p, shape: Vec::new(), step: s.step })
+        .collect()
+}
+
+impl<'a> Problem<'a> {
+    /// Learns calibration, tolerances and noise from drives that are in order (`clean`), or only
+    /// the noise from drives that need not be.
+    pub(crate) fn learn(
+        plant: &'a Plant,
+        drives: Vec<Prepared>,
+        clean: bool,
+        executor: &'a dyn Executor,
+    ) -> Result<Self, DiagnosisError> {
+        let theta = [0.0; PARAMS];
+        let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
+        let reference = Reference::start(&drives, &residuals, theta);
+        let kept = drives.iter().map(|_| Kept::default()).collect();
+        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), kept, executor };
+        problem.rebuild(Changed::Everything)?;
+        for round in 0..2 {
+            if clean || round > 0 {
+                problem.calibrate(clean, round == 0)?;
+            }
+            if clean && round > 0 {
+                problem.scatter();
+                problem.rebuild(Changed::Scatter)?;
+            }
+            let noise = problem.each(|i| problem.without_nuisance(i, &problem.nuisance_mean(i)));
+            problem.reference.whiteners = fit_whiteners(&problem.drives, &noise, false);
+            problem.rebuild(Changed::Noise)?;
+        }
+        if clean {
+            problem.scatter();
+            problem.rebuild(Changed::Scatter)?;
+            problem.reference.ratio = problem.ratios(&problem.reference.theta);
+            problem.reference.settled = problem.settled(&problem.reference.theta);
+            let count = problem.drives.len() as f64;
+            for s in problem.shapes(&problem.reference.theta) {
+                let f = &mut problem.reference.free_form[s.module as usize];
+                *f = f.max(s.log_z / count);
+            }
+        }
+        Ok(problem)
+    }
+
+    /// Mean square of whitened residuals per module; 1 where a module has no rows.
+    pub(crate) fn ratios(&self, theta: &Theta) -> [f64; MODULES] {
+        let mut sums = [(0.0, 0.0); MODULES];
+        for (i, d) in self.drives.iter().enumerate() {
+            for ((sum, w), ok) in sums.iter_mut().zip(&self.whitened(i, theta)).zip(&d.valid) {
+                sum.0 += w.iter().map(|x| x * x).sum::<f64>();
+                sum.1 += ok.iter().filter(|x| **x).count() as f64;
+            }
+        }
+        sums.map(|(s, n)| if n > 0.0 && s > 0.0 { s / n } else { 1.0 })
+    }
+
+    /// A problem on other drives with a reference learned before.
+    pub(crate) fn with(
+        plant: &'a Plant,
+        drives: Vec<Prepared>,
+        reference: Reference,
+        executor: &'a dyn Executor,
+    ) -> Result<Self, DiagnosisError> {
+        let kept = drives.iter().map(|_| Kept::default()).collect();
+        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), kept, executor };
+        problem.rebuild(Changed::Everything)?;
+        Ok(problem)
+    }
+
+    fn each<T: Send>(&self, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+        let slots: Vec<std::sync::Mutex<Option<T>>> =
+            self.drives.iter().map(|_| std::sync::Mutex::new(None)).collect();
+        self.executor.run(self.drives.len(), &|i| {
+            let value = f(i);
+            if let Ok(mut slot) = slots[i].lock() {
+                *slot = Some(value);
+            }
+        });
+        slots.into_iter().filter_map(|s| s.into_inner().ok().flatten()).collect()
+    }
+
+    /// Whitened residuals of drive `i` at `theta`.
+    pub(crate) fn whitened(&self, i: usize, theta: &Theta) -> [Vec<f64>; MODULES] {
+        self.spread(i, &self.at(i, theta))
+    }
+}
+
+/// All residuals of a drive.
+pub(crate) fn replay(d: &Prepared, plant: &Plant, theta: &Theta) -> Residuals {
+    let mut out = Residuals::default();
+    for g in GROUPS {
+        replay_group(d, plant, theta, g, &mut out);
+    }
+    out
+}
+
+/// Inner product with eight running sums, so that the compiler may use wide registers.
+fn inner(a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len().min(b.len());
+    let (mut sums, whole) = ([0.0; 8], n - n % 8);
+    for (x, y) in a[..whole].chunks_exact(8).zip(b[..whole].chunks_exact(8)) {
+        for (s, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *s += x * y;
+        }
+    }
+    let rest: f64 = a[whole..n].iter().zip(&b[whole..n]).map(|(x, y)| x * y).sum();
+    sums.iter().sum::<f64>() + rest
+}

@@ -1,0 +1,193 @@
+//! The tolerances of every drive: sensitivities, their Gram matrix, and what they can take.
+
+use std::sync::OnceLock;
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::signals::Line;
+use super::{Problem, inner, nuisance_directions};
+use crate::DiagnosisError;
+use crate::param::Theta;
+use crate::replay::MODULES;
+
+/// Tolerances of one drive at the reference.
+pub(super) struct Nuisance {
+    /// Residuals at the reference.
+    pub(super) base: Line,
+    /// Sensitivities per unit of the parameter.
+    pub(super) columns: Vec<Line>,
+    /// Standard deviations of the parameters.
+    pub(super) sigma: Vec<f64>,
+    /// Inner products of the columns.
+    products: DMatrix<f64>,
+    /// Cholesky factor of `I + Z'Z`.
+    pub(super) factor: Cholesky<f64, Dyn>,
+    /// Per module, the columns through the adjoint of its whitening filter.
+    adjoint: [OnceLock<Adjoint>; MODULES],
+}
+
+/// Whitened signals through the adjoint of their filter: `x . (F h) = (F' x) . h`.
+pub(super) struct Adjoint {
+    /// Columns that reach the module.
+    pub(super) columns: Vec<usize>,
+    /// Row by row, all of them.
+    pub(super) rows: Vec<f64>,
+}
+
+/// What is left of a drive: whitened, its squared length, its product with the tolerances.
+pub(crate) struct Rest {
+    pub(crate) whitened: [Vec<f64>; MODULES],
+    pub(super) norm: f64,
+    pub(super) tolerances: DVector<f64>,
+}
+
+impl Nuisance {
+    /// `Z'Z`, columns scaled by their standard deviations.
+    pub(super) fn scaled(&self) -> DMatrix<f64> {
+        let q = self.sigma.len();
+        DMatrix::from_fn(q, q, |a, b| self.sigma[a] * self.products[(a, b)] * self.sigma[b])
+    }
+}
+
+/// What the rebuilding of the tolerances can take over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Changed {
+    /// Nothing.
+    Everything,
+    /// The sensitivities, which a small change of the reference leaves as they are.
+    Noise,
+    /// The whitened sensitivities.
+    Scatter,
+}
+
+impl Problem<'_> {
+    /// Residuals and sensitivities to the tolerances at the reference.
+    pub(super) fn rebuild(&mut self, changed: Changed) -> Result<(), DiagnosisError> {
+        if changed != Changed::Scatter {
+            self.kept.iter().for_each(super::signals::Kept::renew);
+        }
+        let directions = nuisance_directions(&self.reference.tolerance);
+        let sigma: Vec<f64> =
+            directions.iter().map(|d| self.reference.tolerance[d.p as usize]).collect();
+        let theta = self.reference.theta;
+        let mut old: Vec<Option<Nuisance>> = core::mem::take(&mut self.nuisance)
+            .into_iter()
+            .map(|n| (n.columns.len() == directions.len()).then_some(n))
+            .collect();
+        old.resize_with(self.drives.len(), || None);
+        let built = self.each(|i| {
+            let base = self.at(i, &theta);
+            let before = old[i].as_ref().filter(|_| changed != Changed::Everything);
+            let renew = |line: &Line| line.iter().map(|s| s.renewed()).collect();
+            let columns: Vec<Line> = match before {
+                Some(n) if changed == Changed::Noise => n.columns.iter().map(renew).collect(),
+                Some(n) => n.columns.clone(),
+                None => directions.iter().map(|d| self.line(i, &theta, d)).collect(),
+            };
+            let products = match before {
+                Some(n) if changed == Changed::Scatter => n.products.clone(),
+                _ => self.inner_products(i, &columns),
+            };
+            let q = columns.len();
+            let s = DMatrix::from_fn(q, q, |a, b| {
+                sigma[a] * products[(a, b)] * sigma[b] + if a == b { 1.0 } else { 0.0 }
+            });
+            let factor = s.cholesky()?;
+            let sigma = sigma.clone();
+            Some(Nuisance { base, columns, sigma, products, factor, adjoint: Default::default() })
+        });
+        self.nuisance = built
+            .into_iter()
+            .collect::<Option<Vec<_>>>()
+            .ok_or_else(|| DiagnosisError::Numerics("tolerances of a drive".into()))?;
+        Ok(())
+    }
+
+    /// Symmetric matrix of the inner products of lines.
+    pub(super) fn inner_products(&self, i: usize, lines: &[Line]) -> DMatrix<f64> {
+        let n = lines.len();
+        let mut out = DMatrix::zeros(n, n);
+        for a in 0..n {
+            for b in a..n {
+                let v = self.dot(i, &lines[a], &lines[b]);
+                out[(a, b)] = v;
+                out[(b, a)] = v;
+            }
+        }
+        out
+    }
+
+    /// Products of a line with the tolerances of drive `i` in their standard deviations.
+    pub(super) fn against(&self, i: usize, line: &Line) -> DVector<f64> {
+        let products = self.products(i, line);
+        let sigma = &self.nuisance[i].sigma;
+        DVector::from_iterator(sigma.len(), products.iter().zip(sigma).map(|(x, s)| x * s))
+    }
+
+    /// Posterior mean of a drive's tolerances at the reference, in their sigmas.
+    pub(super) fn nuisance_mean(&self, i: usize) -> Vec<f64> {
+        let n = &self.nuisance[i];
+        n.factor.solve(&self.against(i, &n.base)).iter().copied().collect()
+    }
+
+    /// What is left of drive `i` at `theta`.
+    pub(crate) fn rest(&self, i: usize, theta: &Theta) -> Rest {
+        let line = self.at(i, theta);
+        let whitened = self.spread(i, &line);
+        Rest {
+            tolerances: self.against(i, &line),
+            norm: whitened.iter().map(|w| inner(w, w)).sum(),
+            whitened,
+        }
+    }
+
+    /// Mean square of whitened residuals per module after what the tolerances of each drive can
+    /// take is taken out; 1 where a module has no rows.
+    pub(crate) fn settled(&self, theta: &Theta) -> [f64; MODULES] {
+        let parts = self.each(|i| {
+            let rest = self.rest(i, theta);
+            let nuisance = &self.nuisance[i];
+            let z = nuisance.factor.solve(&rest.tolerances);
+            let mut left = rest.whitened;
+            for ((line, sigma), z) in nuisance.columns.iter().zip(&nuisance.sigma).zip(z.iter()) {
+                for signals in line {
+                    for (m, c) in signals.group.modules().iter().zip(self.white(i, signals)) {
+                        let left = left[*m as usize].iter_mut();
+                        left.zip(c).for_each(|(x, c)| *x -= z * sigma * c);
+                    }
+                }
+            }
+            left.map(|x| inner(&x, &x))
+        });
+        core::array::from_fn(|m| {
+            let rows: usize =
+                self.drives.iter().map(|d| d.valid[m].iter().filter(|x| **x).count()).sum();
+            let sum: f64 = parts.iter().map(|p| p[m]).sum();
+            if rows > 0 && sum > 0.0 { sum / rows as f64 } else { 1.0 }
+        })
+    }
+
+    /// The tolerances' columns in module `m` of drive `i` through the adjoint of its filter.
+    pub(super) fn adjoint(&self, i: usize, m: usize) -> &Adjoint {
+        self.nuisance[i].adjoint[m].get_or_init(|| {
+            let nuisance = &self.nuisance[i];
+            let mut columns = Vec::new();
+            let mut filtered: Vec<Vec<f64>> = Vec::new();
+            for (j, (line, sigma)) in nuisance.columns.iter().zip(&nuisance.sigma).enumerate() {
+                for signals in line {
+                    for (at, c) in signals.group.modules().iter().zip(self.white(i, signals)) {
+                        if *at as usize == m && !c.is_empty() {
+                            let mut back = self.reference.whiteners[m].adjoint(c);
+                            back.iter_mut().for_each(|x| *x *= sigma);
+                            columns.push(j);
+                            filtered.push(back);
+                        }
+                    }
+                }
+            }
+            let rows = filtered.iter().map(Vec::len).max().unwrap_or(0);
+            let at = |k: usize| filtered.iter().map(move |c| c.get(k).copied().unwrap_or(0.0));
+            Adjoint { columns, rows: (0..rows).flat_map(at).collect() }
+        })
+    }
+}

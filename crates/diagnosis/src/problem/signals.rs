@@ -1,0 +1,229 @@
+//! Residuals and sensitivities of a drive by groups of modules, kept from call to call. A group
+//! does not see the parameters of the others, so what has been replayed once serves wherever only
+//! those of other groups have moved.
+
+use std::collections::{HashMap, VecDeque};
+use std::sync::{Arc, Mutex, OnceLock};
+
+use super::{Direction, Problem, inner};
+use crate::param::{SPECS, Theta};
+use crate::replay::{GROUPS, Group, MODULES, Residuals, affects, offset_of, replay_group};
+
+/// Residuals of one group at one point, or a sensitivity: minus the derivative of the residual.
+#[derive(Debug)]
+pub(super) struct Signals {
+    pub(super) group: Group,
+    /// A residual rather than a sensitivity: clipped when whitened.
+    residual: bool,
+    /// Per module of the group; empty where it is not available.
+    raw: Arc<Vec<Vec<f64>>>,
+    whitened: OnceLock<Vec<Vec<f64>>>,
+    /// Inner products with the sensitivities to the drive's tolerances.
+    products: OnceLock<Vec<f64>>,
+}
+
+/// What one direction, or one point, does to the groups that it touches.
+pub(super) type Line = Vec<Arc<Signals>>;
+
+type Key = Vec<u64>;
+
+/// Raw samples kept per drive.
+const KEPT: usize = 3_000_000;
+
+/// What has been replayed of one drive, oldest first.
+#[derive(Debug, Default)]
+pub(super) struct Kept(Mutex<Store>);
+
+#[derive(Debug, Default)]
+struct Store {
+    entries: HashMap<Key, Arc<Signals>>,
+    order: VecDeque<Key>,
+    samples: usize,
+}
+
+/// Limit of a whitened residual: beyond it a row says "wrong" but not "how wrong".
+const CLIP: f64 = 1e3;
+
+impl Signals {
+    fn new(group: Group, residual: bool, raw: Arc<Vec<Vec<f64>>>) -> Self {
+        Self { group, residual, raw, whitened: OnceLock::new(), products: OnceLock::new() }
+    }
+
+    /// The same, to be whitened again.
+    pub(super) fn renewed(&self) -> Arc<Self> {
+        Arc::new(Self::new(self.group, self.residual, self.raw.clone()))
+    }
+
+    fn samples(&self) -> usize {
+        self.raw.iter().map(Vec::len).sum()
+    }
+}
+
+impl Kept {
+    fn get(&self, key: &Key) -> Option<Arc<Signals>> {
+        self.0.lock().ok()?.entries.get(key).cloned()
+    }
+
+    fn put(&self, key: Key, signals: Arc<Signals>) {
+        let Ok(mut store) = self.0.lock() else { return };
+        store.samples += signals.samples();
+        store.order.push_back(key.clone());
+        if let Some(twice) = store.entries.insert(key, signals) {
+            store.samples -= twice.samples();
+        }
+        while store.samples > KEPT
+            && let Some(oldest) = store.order.pop_front()
+        {
+            if let Some(gone) = store.entries.remove(&oldest) {
+                store.samples -= gone.samples();
+            }
+        }
+    }
+
+    /// Noise or tolerances have changed: what was replayed stays.
+    pub(super) fn renew(&self) {
+        if let Ok(mut store) = self.0.lock() {
+            store.entries.values_mut().for_each(|s| *s = s.renewed());
+        }
+    }
+}
+
+/// Values of the parameters that a group sees.
+fn seen(group: Group, theta: &Theta) -> impl Iterator<Item = u64> + '_ {
+    SPECS
+        .iter()
+        .filter(move |s| affects(s.p).contains(&group))
+        .map(|s| theta[s.p as usize].to_bits())
+}
+
+impl Problem<'_> {
+    /// Residuals of a group at `theta`.
+    pub(super) fn point(&self, i: usize, group: Group, theta: &Theta) -> Arc<Signals> {
+        let key: Key = core::iter::once(group as u64).chain(seen(group, theta)).collect();
+        if let Some(kept) = self.kept[i].get(&key) {
+            return kept;
+        }
+        let raw = Arc::new(self.replay_one(i, group, theta));
+        let signals = Arc::new(Signals::new(group, true, raw));
+        self.kept[i].put(key, signals.clone());
+        signals
+    }
+
+    /// Residuals of all groups at `theta`.
+    pub(super) fn at(&self, i: usize, theta: &Theta) -> Line {
+        GROUPS.iter().map(|g| self.point(i, *g, theta)).collect()
+    }
+
+    /// Sensitivities along a direction from `theta`, of the groups that it touches.
+    pub(super) fn line(&self, i: usize, theta: &Theta, direction: &Direction) -> Line {
+        let groups = affects(direction.p);
+        groups.iter().map(|g| self.sensitivity(i, *g, theta, direction)).collect()
+    }
+
+    fn sensitivity(
+        &self,
+        i: usize,
+        group: Group,
+        theta: &Theta,
+        direction: &Direction,
+    ) -> Arc<Signals> {
+        let mut t = *theta;
+        for (p, v) in &direction.shape {
+            t[*p as usize] = *v;
+        }
+        let key: Key = [group as u64, direction.p as u64, direction.step.to_bits()]
+            .into_iter()
+            .chain(seen(group, theta))
+            .chain(seen(group, &t))
+            .collect();
+        if let Some(kept) = self.kept[i].get(&key) {
+            return kept;
+        }
+        let raw =
+            if let Some(offset) = offset_of(direction.p).filter(|o| group.modules().contains(o)) {
+                let d = &self.drives[i];
+                let of = |m: &crate::replay::Module| -> Vec<f64> {
+                    let size = if *m == offset { 1.0 } else { 0.0 };
+                    let rows = &d.valid[*m as usize];
+                    if d.available[*m as usize] {
+                        rows.iter().map(|ok| if *ok { size } else { 0.0 }).collect()
+                    } else {
+                        Vec::new()
+                    }
+                };
+                group.modules().iter().map(of).collect()
+            } else {
+                t[direction.p as usize] += direction.step;
+                let mut moved = self.replay_one(i, group, &t);
+                let base = self.point(i, group, theta);
+                for (x, b) in moved.iter_mut().flatten().zip(base.raw.iter().flatten()) {
+                    *x = (b - *x) / direction.step;
+                }
+                moved
+            };
+        let signals = Arc::new(Signals::new(group, false, Arc::new(raw)));
+        self.kept[i].put(key, signals.clone());
+        signals
+    }
+
+    fn replay_one(&self, i: usize, group: Group, theta: &Theta) -> Vec<Vec<f64>> {
+        let mut out = Residuals::default();
+        replay_group(&self.drives[i], self.plant, theta, group, &mut out);
+        group.modules().iter().map(|m| core::mem::take(&mut out[*m as usize])).collect()
+    }
+
+    /// Whitened signals, per module of the group.
+    pub(super) fn white<'s>(&self, i: usize, signals: &'s Signals) -> &'s [Vec<f64>] {
+        signals.whitened.get_or_init(|| {
+            let modules = signals.group.modules().iter();
+            let of = |(m, raw): (&crate::replay::Module, &Vec<f64>)| {
+                if raw.is_empty() {
+                    return Vec::new();
+                }
+                let whitener = &self.reference.whiteners[*m as usize];
+                let mut w = whitener.apply(raw, &self.drives[i].valid[*m as usize]);
+                if signals.residual {
+                    for x in &mut w {
+                        *x = if x.is_finite() { x.clamp(-CLIP, CLIP) } else { CLIP };
+                    }
+                }
+                w
+            };
+            modules.zip(signals.raw.iter()).map(of).collect()
+        })
+    }
+
+    /// Whitened signals of a line by module; empty where it does not reach.
+    pub(super) fn spread(&self, i: usize, line: &Line) -> [Vec<f64>; MODULES] {
+        let mut out: [Vec<f64>; MODULES] = Default::default();
+        for signals in line {
+            for (m, w) in signals.group.modules().iter().zip(self.white(i, signals)) {
+                out[*m as usize].clone_from(w);
+            }
+        }
+        out
+    }
+
+    /// Inner product of two lines.
+    pub(super) fn dot(&self, i: usize, a: &Line, b: &Line) -> f64 {
+        a.iter()
+            .flat_map(|a| b.iter().filter(|b| b.group == a.group).map(move |b| (a, b)))
+            .flat_map(|(a, b)| self.white(i, a).iter().zip(self.white(i, b)))
+            .map(|(a, b)| inner(a, b))
+            .sum()
+    }
+
+    /// Inner products of a line with the sensitivities to the tolerances of the drive.
+    pub(super) fn products(&self, i: usize, line: &Line) -> Vec<f64> {
+        let columns = &self.nuisance[i].columns;
+        let mut out = vec![0.0; columns.len()];
+        for signals in line {
+            let products = signals.products.get_or_init(|| {
+                let own = vec![signals.clone()];
+                columns.iter().map(|c| self.dot(i, c, &own)).collect()
+            });
+            out.iter_mut().zip(products).for_each(|(x, p)| *x += p);
+        }
+        out
+    }
+}

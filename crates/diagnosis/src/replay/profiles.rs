@@ -1,0 +1,63 @@
+//! Signals that depend on few parameters and cost more than the balance that they enter: delayed
+//! pressure, brake heating, fan, cold tyres, shifted grade. Kept per drive for the last values of
+//! those parameters, which rest while others are fitted.
+
+use std::sync::{Arc, Mutex};
+
+/// What a kept signal is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Pressure that brakes, kPa; over the lag.
+    Pressure,
+    /// Heating of the brakes above the air, K; over lag and speed scale.
+    BrakeHeat,
+    /// How far the fan is on, 0 to 1; over start and hysteresis.
+    Fan,
+    /// Share of the cold tyres' extra that is left; over the time constant.
+    Cold,
+    /// Grade of the map; over its shift.
+    Grade,
+    /// Fuel rate of the map and load; over the lag.
+    Willans,
+    /// Torque over full load; over the lag.
+    Load,
+    /// Pedal after its dead time.
+    Pedal,
+}
+
+/// Most signals kept per drive.
+const KEPT: usize = 28;
+
+type Entry = (Kind, [u64; 2], Arc<[f64]>);
+
+/// The kept signals of one drive, the latest at the end.
+#[derive(Debug, Default)]
+pub(crate) struct Profiles(Mutex<Vec<Entry>>);
+
+impl Profiles {
+    /// The signal at two parameter values, built where it is not kept.
+    pub(super) fn get(
+        &self,
+        kind: Kind,
+        at: [f64; 2],
+        build: impl FnOnce() -> Vec<f64>,
+    ) -> Arc<[f64]> {
+        let key = at.map(f64::to_bits);
+        if let Ok(mut kept) = self.0.lock()
+            && let Some(i) = kept.iter().rposition(|e| e.0 == kind && e.1 == key)
+        {
+            let entry = kept.remove(i);
+            let signal = entry.2.clone();
+            kept.push(entry);
+            return signal;
+        }
+        let signal: Arc<[f64]> = build().into();
+        if let Ok(mut kept) = self.0.lock() {
+            if kept.len() >= KEPT {
+                kept.remove(0);
+            }
+            kept.push((kind, key, signal.clone()));
+        }
+        signal
+    }
+}
