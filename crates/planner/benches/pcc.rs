@@ -15,7 +15,8 @@ use planner::pcc::lin::Subproblem;
 use planner::pcc::solution::Solution;
 use planner::pcc::solver::DefaultSolver;
 use planner::pcc::structured::Structured;
-use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
+use planner::pcc::trip::{Trip, TripRequest};
+use planner::pcc::trip_result::plan_trip_with;
 use planner::pcc::{SpeedBand, Tuning, clarabel_backend};
 use std::hint::black_box;
 

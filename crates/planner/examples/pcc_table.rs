@@ -14,7 +14,8 @@ mod data_sheet;
 mod dp;
 
 use planner::pcc::solver::DefaultSolver;
-use planner::pcc::trip::{Trip, TripRequest, plan_trip};
+use planner::pcc::trip::{Trip, TripRequest};
+use planner::pcc::trip_result::plan_trip;
 use planner::pcc::{SpeedBand, Tuning};
 
 /// Difference to the fuel of a reference that pays nothing at fuel cut-off, %.

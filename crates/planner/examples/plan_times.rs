@@ -18,7 +18,8 @@ use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
 use planner::pcc::solution::{Solution, SolveStatus};
 use planner::pcc::solver::DefaultSolver;
 use planner::pcc::structured::Structured;
-use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
+use planner::pcc::trip::{Trip, TripRequest};
+use planner::pcc::trip_result::plan_trip_with;
 use planner::pcc::{SpeedBand, Tuning, clarabel_backend};
 use rustix::time::{ClockId, clock_gettime};
 

@@ -15,7 +15,8 @@ mod dp;
 
 use planner::pcc::drive::Driven;
 use planner::pcc::solver::DefaultSolver;
-use planner::pcc::trip::{Trip, TripRequest, TripStatus, plan_trip};
+use planner::pcc::trip::{Trip, TripRequest};
+use planner::pcc::trip_result::{TripStatus, plan_trip};
 use planner::pcc::truck::Drive;
 use planner::pcc::{SpeedBand, Tuning};
 use road::ProfilePoint;

@@ -209,7 +209,7 @@ fn a_solver_that_hits_its_iteration_limit_leaves_cruise_control_in_charge() {
     let d = road.lanes()[0].center_d_m(0.0);
     let mut plant = Plant::new(&road, reference_limits(), 100.0, d, 18.0);
     let mut config = predictive();
-    config.speed_plan.iteration_budget = 5;
+    config.speed_plan.iteration_budget = 1;
     let mut stack = Stack::new(config, &reference_limits()).unwrap();
     let mut traffic = no_traffic();
     for i in 0..6_000 {

@@ -236,6 +236,9 @@ fn settings(tolerance: f64) -> DefaultSettings<f64> {
         max_iter: 60,
         presolve_enable: false,
         max_threads: 1,
+        iterative_refinement_reltol: 1e-9,
+        iterative_refinement_abstol: 1e-10,
+        iterative_refinement_max_iter: 3,
         ..DefaultSettings::default()
     }
 }

@@ -7,7 +7,7 @@
 use alloc::vec::Vec;
 
 use super::course::Course;
-use super::truck::{Drive, Truck};
+use super::truck::{Drive, Operating, Truck};
 
 /// Smallest energy that is driven, J/kg (about 0.6 m/s).
 pub(crate) const E_FLOOR: f64 = 0.18;
@@ -91,27 +91,36 @@ pub(crate) fn demand_m_s2(
     e0: f64,
     e1: f64,
 ) -> f64 {
-    demand_and_limit(truck, course, k, drive, e0, e1).0
+    Demand::new(truck, course, k, drive, e0, e1).needed_m_s2
 }
 
-/// [`demand_m_s2`] and the full load's traction at the mean energy, m/s².
-fn demand_and_limit(
-    truck: &Truck,
-    course: &Course,
-    k: usize,
-    drive: Drive,
-    e0: f64,
-    e1: f64,
-) -> (f64, f64) {
-    let mean = 0.5 * (e0 + e1);
-    let (overrun, limit) = match drive {
-        Drive::Gear(g) => truck.forces_m_s2(g as usize, libm::sqrt(2.0 * mean)),
-        Drive::Neutral => (0.0, 0.0),
-    };
-    let demand = truck.inertia(drive) * (e1 - e0) / course.h_m
-        + overrun
-        + truck.resistance_m_s2(mean, course.sin[k], course.cos[k]);
-    (demand, limit)
+/// What an interval needs, and what the engine has at its mean energy.
+struct Demand<'a> {
+    /// As [`demand_m_s2`].
+    needed_m_s2: f64,
+    /// Full load's traction, m/s²; zero with the driveline open.
+    limit_m_s2: f64,
+    /// The engine; `None` with the driveline open.
+    at: Option<Operating<'a>>,
+}
+
+impl<'a> Demand<'a> {
+    fn new(truck: &'a Truck, course: &Course, k: usize, drive: Drive, e0: f64, e1: f64) -> Self {
+        let mean = 0.5 * (e0 + e1);
+        let at = match drive {
+            Drive::Gear(g) => Some(truck.at(g as usize, libm::sqrt(2.0 * mean))),
+            Drive::Neutral => None,
+        };
+        let needed_m_s2 = truck.inertia(drive) * (e1 - e0) / course.h_m
+            + at.map_or(0.0, |at| at.overrun_m_s2())
+            + truck.resistance_m_s2(mean, course.sin[k], course.cos[k]);
+        Self { needed_m_s2, limit_m_s2: at.map_or(0.0, |at| at.traction_m_s2()), at }
+    }
+
+    /// Need beyond full load, m/s²; negative where there is power to spare.
+    fn excess_m_s2(&self) -> f64 {
+        self.needed_m_s2 - self.limit_m_s2
+    }
 }
 
 /// Excess of demand over full load that counts as none, m/s².
@@ -128,10 +137,7 @@ fn full_load_energy(
     target: f64,
     excess_at_target: f64,
 ) -> f64 {
-    let excess = |e1: f64| {
-        let (demand, limit) = demand_and_limit(truck, course, k, drive, e0, e1);
-        demand - limit
-    };
+    let excess = |e1: f64| Demand::new(truck, course, k, drive, e0, e1).excess_m_s2();
     let (mut high, mut f_high) = (target, excess_at_target);
     // The inertia alone tells how far below the target the root lies, to first order.
     let slope = truck.inertia(drive) / course.h_m;
@@ -184,10 +190,7 @@ pub(crate) fn needed_before(
     e0: f64,
     e1: f64,
 ) -> f64 {
-    let excess = |e0: f64| {
-        let (demand, limit) = demand_and_limit(truck, course, k, drive, e0, e1);
-        demand - limit
-    };
+    let excess = |e0: f64| Demand::new(truck, course, k, drive, e0, e1).excess_m_s2();
     let mut before = e0;
     // The inertia dominates: each step takes away most of what is missing.
     for _ in 0..8 {
@@ -210,26 +213,28 @@ pub fn drive_leg(
     target_e: f64,
 ) -> Leg {
     let mut e1 = target_e.max(E_FLOOR);
-    let (mut demand, mut limit) = demand_and_limit(truck, course, k, drive, e0, e1);
-    let reached = if demand > limit {
-        full_load_energy(truck, course, k, drive, e0, e1, demand - limit)
-    } else if demand < -course.brake_m_s2 {
-        let rest = (-course.brake_m_s2 - demand) * course.h_m / truck.inertia(drive);
+    let mut demand = Demand::new(truck, course, k, drive, e0, e1);
+    let needed = demand.needed_m_s2;
+    let reached = if needed > demand.limit_m_s2 {
+        full_load_energy(truck, course, k, drive, e0, e1, demand.excess_m_s2())
+    } else if needed < -course.brake_m_s2 {
+        let rest = (-course.brake_m_s2 - needed) * course.h_m / truck.inertia(drive);
         (e1 + rest).max(e1)
     } else {
         e1
     };
     if reached != e1 {
         e1 = reached;
-        (demand, limit) = demand_and_limit(truck, course, k, drive, e0, e1);
+        demand = Demand::new(truck, course, k, drive, e0, e1);
     }
-    let mean = 0.5 * (e0 + e1);
+    let needed = demand.needed_m_s2;
     let time_s = duration_s(course.h_m, e0, e1);
-    let p = demand.max(0.0).min(limit);
+    let p = needed.max(0.0).min(demand.limit_m_s2);
     // Rounding must not turn fuel cut-off into injection.
     let p = if p < 1e-7 { 0.0 } else { p };
-    let brake = if demand < -1e-9 { -demand } else { 0.0 };
-    let fuel_g = truck.fuel_g_s(drive, libm::sqrt(2.0 * mean), p) * time_s;
+    let brake = if needed < -1e-9 { -needed } else { 0.0 };
+    let fuel_g_s = demand.at.map_or(truck.idle_fuel_g_s(), |at| at.fuel_g_s(p));
+    let fuel_g = fuel_g_s * time_s;
     Leg { end_e_j_kg: e1, time_s, p_m_s2: p, brake_m_s2: brake, fuel_g }
 }
 

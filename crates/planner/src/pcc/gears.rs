@@ -98,8 +98,9 @@ fn interval_cost(
 ) -> f64 {
     let drive = Drive::Gear(g as u8);
     let need = demand_m_s2(truck, course, k, drive, e0, e1);
-    let most = truck.traction_m_s2(g, v);
-    let fuel = |p: f64| course.h_m / v * truck.fuel_charged_g_s(drive, v, p);
+    let at = truck.at(g, v);
+    let most = at.traction_m_s2();
+    let fuel = |p: f64| course.h_m / v * at.fuel_charged_g_s(p);
     let p = need.clamp(0.0, most);
     let at_need = fuel(p);
     let missing = (need - most).max(0.0);

@@ -27,7 +27,7 @@ use tractrix_core::GRAVITY_M_S2;
 use super::course::{Course, Tuning};
 use super::drive::duration_s;
 use super::sqp::CutModel;
-use super::truck::{Drive, Truck};
+use super::truck::{Drive, Operating, Truck};
 
 /// What holds at the last node.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -170,14 +170,21 @@ impl Subproblem {
             let drive = gears[k];
             self.mean0[k] = mean;
             let mu = truck.inertia(drive);
-            let (overrun, overrun_slope) = overrun_line(truck, drive, v);
+            let around = match drive {
+                Drive::Gear(g) => Some(Around::new(truck, g as usize, v)),
+                Drive::Neutral => None,
+            };
+            let (overrun, overrun_slope) = around.as_ref().map_or((0.0, 0.0), Around::overrun_line);
             let slope = overrun_slope + truck.drag_1_m;
             self.a0[k] = -mu / h + 0.5 * slope;
             self.a1[k] = mu / h + 0.5 * slope;
             self.r[k] = overrun - overrun_slope * mean
                 + GRAVITY_M_S2 * (course.sin[k] + truck.rolling_coeff * course.cos[k]);
             let p = (self.a0[k] * e[k] + self.a1[k] * e[k + 1] + self.r[k]).max(0.0);
-            self.traction_and_fuel(truck, drive, k, v, p, cut);
+            match &around {
+                Some(around) => self.traction_and_fuel(around, k, p, cut),
+                None => self.rolling(truck.idle_fuel_g_s(), k, v),
+            }
             q_typical += self.q1[k];
             self.wa[k] = tuning.accel_penalty_g_s3_m2 / (h * v);
             let sum = v0 + v1;
@@ -189,55 +196,45 @@ impl Subproblem {
         self.b_cost = 1e-3 * q_typical / n as f64;
     }
 
-    fn traction_and_fuel(
-        &mut self,
-        truck: &Truck,
-        drive: Drive,
-        k: usize,
-        v: f64,
-        p: f64,
-        cut: CutModel,
-    ) {
+    /// An interval with the driveline open.
+    fn rolling(&mut self, idle_g_s: f64, k: usize, v: f64) {
         let h = self.h_m;
-        let per_interval = |v: f64, p: f64| h / v * truck.fuel_charged_g_s(drive, v, p);
-        let low = (v - SLOPE_STEP).max(0.5 * v);
-        let high = v + SLOPE_STEP;
-        let d_e = 0.5 * (high * high - low * low);
-        self.ge[k] = (per_interval(high, p) - per_interval(low, p)) / d_e;
-        match drive {
-            Drive::Neutral => {
-                self.phi0[k] = NEUTRAL_TRACTION;
-                self.phi1[k] = 0.0;
-                self.q1[k] = h;
-                self.q2[k] = 0.0;
-                self.kink[k] = NEUTRAL_TRACTION;
-                self.discount[k] = LEAST_DISCOUNT * h;
-            }
-            Drive::Gear(g) => {
-                let g = g as usize;
-                let phi = truck.traction_m_s2(g, v);
-                let slope = (truck.traction_m_s2(g, high) - truck.traction_m_s2(g, low)) / d_e;
-                self.phi1[k] = slope;
-                self.phi0[k] = phi - slope * self.mean0[k];
-                // Quadratic through the map at zero wheel force, half way and full traction; only
-                // its convex part. Below zero wheel force a straight line to fuel cut-off, where
-                // the true flow is zero: with a map that jumps there, its lower convex hull.
-                let kink = truck.overrun_m_s2(g, v).min(0.9 * phi);
-                let half = 0.5 * (phi - kink);
-                let f = [0.0, 1.0, 2.0].map(|u| per_interval(v, kink + u * half));
-                let bend = (f[2] - 2.0 * f[1] + f[0]) / (half * half);
-                self.q2[k] = bend.max(0.0);
-                self.q1[k] = (f[2] - f[0]) / (2.0 * half) - self.q2[k] * (kink + half);
-                let zero = match cut {
-                    CutModel::Hull => 0.0,
-                    CutModel::Charged => per_interval(v, 0.0),
-                };
-                let below = (f[0] - zero) / kink;
-                let above = self.q1[k] + self.q2[k] * kink;
-                self.kink[k] = kink;
-                self.discount[k] = (above - below).max(LEAST_DISCOUNT * above);
-            }
-        }
+        let (low, high, d_e) = slope_range(v);
+        self.ge[k] = (h / high * idle_g_s - h / low * idle_g_s) / d_e;
+        self.phi0[k] = NEUTRAL_TRACTION;
+        self.phi1[k] = 0.0;
+        self.q1[k] = h;
+        self.q2[k] = 0.0;
+        self.kink[k] = NEUTRAL_TRACTION;
+        self.discount[k] = LEAST_DISCOUNT * h;
+    }
+
+    fn traction_and_fuel(&mut self, around: &Around<'_>, k: usize, p: f64, cut: CutModel) {
+        let h = self.h_m;
+        let Around { v, v_low, v_high, d_e, here, low, high } = around;
+        let per_interval = |v: f64, at: &Operating<'_>, p: f64| h / v * at.fuel_charged_g_s(p);
+        self.ge[k] = (per_interval(*v_high, high, p) - per_interval(*v_low, low, p)) / d_e;
+        let phi = here.traction_m_s2();
+        let slope = (high.traction_m_s2() - low.traction_m_s2()) / d_e;
+        self.phi1[k] = slope;
+        self.phi0[k] = phi - slope * self.mean0[k];
+        // Quadratic through the map at zero wheel force, half way and full traction; only
+        // its convex part. Below zero wheel force a straight line to fuel cut-off, where
+        // the true flow is zero: with a map that jumps there, its lower convex hull.
+        let kink = here.overrun_m_s2().min(0.9 * phi);
+        let half = 0.5 * (phi - kink);
+        let f = [0.0, 1.0, 2.0].map(|u| per_interval(*v, here, kink + u * half));
+        let bend = (f[2] - 2.0 * f[1] + f[0]) / (half * half);
+        self.q2[k] = bend.max(0.0);
+        self.q1[k] = (f[2] - f[0]) / (2.0 * half) - self.q2[k] * (kink + half);
+        let zero = match cut {
+            CutModel::Hull => 0.0,
+            CutModel::Charged => per_interval(*v, here, 0.0),
+        };
+        let below = (f[0] - zero) / kink;
+        let above = self.q1[k] + self.q2[k] * kink;
+        self.kink[k] = kink;
+        self.discount[k] = (above - below).max(LEAST_DISCOUNT * above);
     }
 
     /// Leaves marked intervals (empty: none) no traction beyond the solver's interior.
@@ -267,16 +264,34 @@ impl Subproblem {
     }
 }
 
-/// Overrun drag per mass and its slope in the mean energy.
-fn overrun_line(truck: &Truck, drive: Drive, v: f64) -> (f64, f64) {
-    match drive {
-        Drive::Neutral => (0.0, 0.0),
-        Drive::Gear(g) => {
-            let g = g as usize;
-            let low = (v - SLOPE_STEP).max(0.5 * v);
-            let high = v + SLOPE_STEP;
-            let rise = truck.overrun_m_s2(g, high) - truck.overrun_m_s2(g, low);
-            (truck.overrun_m_s2(g, v), rise / (0.5 * (high * high - low * low)))
-        }
+/// Speeds a little below and above `v`, m/s, and the energy between them, J/kg.
+fn slope_range(v: f64) -> (f64, f64, f64) {
+    let low = (v - SLOPE_STEP).max(0.5 * v);
+    let high = v + SLOPE_STEP;
+    (low, high, 0.5 * (high * high - low * low))
+}
+
+/// The engine at the speed of an interval and a little below and above it.
+struct Around<'a> {
+    v: f64,
+    v_low: f64,
+    v_high: f64,
+    d_e: f64,
+    here: Operating<'a>,
+    low: Operating<'a>,
+    high: Operating<'a>,
+}
+
+impl<'a> Around<'a> {
+    fn new(truck: &'a Truck, g: usize, v: f64) -> Self {
+        let (v_low, v_high, d_e) = slope_range(v);
+        let [here, low, high] = [v, v_low, v_high].map(|v| truck.at(g, v));
+        Self { v, v_low, v_high, d_e, here, low, high }
+    }
+
+    /// Overrun drag per mass and its slope in the mean energy.
+    fn overrun_line(&self) -> (f64, f64) {
+        let rise = self.high.overrun_m_s2() - self.low.overrun_m_s2();
+        (self.here.overrun_m_s2(), rise / self.d_e)
     }
 }

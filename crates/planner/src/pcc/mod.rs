@@ -10,6 +10,7 @@
 //! | file | idea |
 //! |---|---|
 //! | [`truck`] | traction, overrun and fuel per gear, from what the truck reports |
+//! | `engine` | the engine's torque curves, read in one step |
 //! | [`course`] | road at equal steps, speed ceilings, tuning |
 //! | [`drive`] | the truth: driving a profile through the nonlinear truck |
 //! | [`cruise`] | conventional cruise control, the baselines |
@@ -21,6 +22,7 @@
 //! | [`gears`] | shift places along a profile |
 //! | [`sqp`] | the iteration |
 //! | [`trip`] | whole trips against both baselines |
+//! | [`trip_result`] | what a trip's plan comes to |
 //! | [`eco_roll`] | coasting with the driveline open |
 //! | [`horizon`] | the next kilometres, renewed while driving |
 //! | [`horizon_time`] | trip-time controller: the price of a second |
@@ -34,6 +36,7 @@ pub mod course;
 pub mod cruise;
 pub mod drive;
 pub mod eco_roll;
+mod engine;
 mod error;
 pub mod gears;
 pub mod horizon;
@@ -48,10 +51,12 @@ pub mod solver;
 pub mod sqp;
 pub mod structured;
 pub mod trip;
+pub mod trip_result;
 pub mod truck;
 
 pub use course::{SpeedBand, Tuning};
 pub use error::PccError;
-pub use trip::{
-    TripRequest, TripResult, TripRow, TripStatus, TripTotals, plan_trip, plan_trip_with,
+pub use trip::TripRequest;
+pub use trip_result::{
+    TripPlan, TripResult, TripRow, TripStatus, TripTotals, plan_trip, plan_trip_with,
 };

@@ -48,10 +48,10 @@ impl Point {
         if !truck.usable(g, v) {
             return Self::IDLE;
         }
-        let drive = Drive::Gear(g as u8);
-        let (drag, top) = truck.forces_m_s2(g, v);
+        let at = truck.at(g, v);
+        let (drag, top) = (at.overrun_m_s2(), at.traction_m_s2());
         let piece = (top - drag).max(0.0) / (LEVELS - 1) as f64;
-        let fuel = |p: f64| (truck.fuel_charged_g_s(drive, v, p) / v) as f32;
+        let fuel = |p: f64| (at.fuel_charged_g_s(p) / v) as f32;
         Self {
             drag: drag as f32,
             limit: top as f32,
@@ -106,12 +106,13 @@ impl EngineTables {
         self.points
             .chunks_exact(self.rows)
             .enumerate()
-            .map(|(g, all)| Gear {
-                index: g,
-                inertia: truck.inertia(Drive::Gear(g as u8)),
-                points: (0..count).map(|m| all[row_of(m)]).collect(),
+            .filter_map(|(g, all)| {
+                let points: Vec<Point> = (0..count).map(|m| all[row_of(m)]).collect();
+                let first = points.iter().position(|p| p.limit > 0.0)?;
+                let last = points.iter().rposition(|p| p.limit > 0.0)?;
+                let inertia = truck.inertia(Drive::Gear(g as u8));
+                Some(Gear { index: g, inertia, points, drives: (first, last + 1) })
             })
-            .filter(|gear| gear.points.iter().any(|p| p.limit > 0.0))
             .collect()
     }
 }
@@ -121,6 +122,20 @@ struct Gear {
     index: usize,
     inertia: f64,
     points: Vec<Point>,
+    /// First point at which the gear drives, and the first beyond.
+    drives: (usize, usize),
+}
+
+/// The cheapest way to a node in a gear.
+#[derive(Debug, Clone, Copy)]
+struct Way {
+    cost_g: f64,
+    /// Index and gear slot before: `index × gears + slot`.
+    from: u32,
+}
+
+impl Way {
+    const NONE: Self = Self { cost_g: f64::INFINITY, from: u32::MAX };
 }
 
 /// Golden ratio's fraction, the step of the dither.
@@ -242,19 +257,19 @@ pub fn search(
     let m = gears.len();
     let lowest = grid.low.iter().copied().min()?;
     let c0 = grid.count[0] as usize;
-    let mut cost = alloc::vec![f64::INFINITY; c0 * m];
+    // Ways to the nodes of a stage: gear by gear, energies side by side.
+    let mut ways = alloc::vec![Way::NONE; c0 * m];
     let first = usize::try_from(-grid.low[0]).ok().filter(|&i| i < c0)?;
     for (slot, gear) in gears.iter().enumerate() {
         let same = start_gear.is_none_or(|s| s as usize == gear.index);
-        cost[first * m + slot] = if same { 0.0 } else { prices.shift_fuel_g };
+        ways[slot * c0 + first].cost_g = if same { 0.0 } else { prices.shift_fuel_g };
     }
     let mut parents: Vec<Vec<u32>> = Vec::with_capacity(n);
     let mut speeds = alloc::vec![libm::sqrt(2.0 * grid.start_e); c0];
     let mut of_time = Vec::new();
     for k in 0..n {
         let c1 = grid.count[k + 1] as usize;
-        let mut next = alloc::vec![f64::INFINITY; c1 * m];
-        let mut parent = alloc::vec![u32::MAX; c1 * m];
+        let mut next = alloc::vec![Way::NONE; c1 * m];
         let after: Vec<f64> =
             (0..c1).map(|j| libm::sqrt(2.0 * grid.energy(k + 1, j).max(0.02))).collect();
         let mut stage = Stage {
@@ -266,13 +281,14 @@ pub fn search(
             brake: prices.brake_m_s2,
             free_cut: prices.free_cut,
             dither: (k as f64 * GOLDEN) % 1.0,
-            gears: m,
             next: &mut next,
-            parent: &mut parent,
         };
-        for (i, row) in cost.chunks_exact(m).enumerate() {
-            let best = (0..m).min_by(|&a, &b| row[a].total_cmp(&row[b]))?;
-            if !row[best].is_finite() {
+        let c = grid.count[k] as usize;
+        for i in 0..c {
+            let cost_of = |slot: usize| ways[slot * c + i].cost_g;
+            let best = (0..m).min_by(|&a, &b| cost_of(a).total_cmp(&cost_of(b)))?;
+            let shifted = cost_of(best) + prices.shift_fuel_g;
+            if !shifted.is_finite() {
                 continue;
             }
             let e0 = grid.energy(k, i);
@@ -286,33 +302,39 @@ pub fn search(
             }));
             let sum = (grid.low[k] + grid.low[k + 1] - 2 * lowest) as usize + i;
             for (slot, gear) in gears.iter().enumerate() {
-                let (base, came) = if row[slot] <= row[best] + prices.shift_fuel_g {
-                    (row[slot], slot)
-                } else {
-                    (row[best] + prices.shift_fuel_g, best)
-                };
+                let own = cost_of(slot);
+                let (base, came) = if own <= shifted { (own, slot) } else { (shifted, best) };
                 let code = (i * m + came) as u32;
                 stage.expand(gear, slot, (i, e0), (base, code), sum, &of_time);
             }
         }
-        parents.push(parent);
-        cost = next;
+        parents.push(next.iter().map(|way| way.from).collect());
+        ways = next;
         speeds = after;
     }
-    let mut at = (0..cost.len()).min_by(|&a, &b| cost[a].total_cmp(&cost[b]))?;
-    let cost_g = cost[at];
+    let end = (0..ways.len()).min_by(|&a, &b| ways[a].cost_g.total_cmp(&ways[b].cost_g))?;
+    let cost_g = ways[end].cost_g;
     if !cost_g.is_finite() {
         return None;
     }
+    let last = grid.count[n] as usize;
+    let (mut at, mut slot) = (end % last, end / last);
     let mut e = alloc::vec![grid.start_e; n + 1];
     let mut path = alloc::vec![0u8; n];
     for k in (0..n).rev() {
-        e[k + 1] = grid.energy(k + 1, at / m);
-        path[k] = gears[at % m].index as u8;
-        at = parents[k][at] as usize;
+        e[k + 1] = grid.energy(k + 1, at);
+        path[k] = gears[slot].index as u8;
+        let from = parents[k][slot * grid.count[k + 1] as usize + at] as usize;
+        (at, slot) = (from / m, from % m);
     }
     let time_s = e.windows(2).map(|w| super::drive::duration_s(grid.h_m, w[0], w[1])).sum();
     Some(SearchPath { e_j_kg: e, gears: path, cost_g, time_s })
+}
+
+/// Smallest integer not below `x`, saturating. A cast is one instruction where `ceil` is a call.
+fn round_up(x: f64) -> i32 {
+    let cut = x as i32;
+    cut.saturating_add(i32::from(f64::from(cut) < x))
 }
 
 /// One interval of a search.
@@ -328,9 +350,7 @@ struct Stage<'a> {
     free_cut: bool,
     /// Part of an energy step by which full load may be exceeded, 0 to 1.
     dither: f64,
-    gears: usize,
-    next: &'a mut [f64],
-    parent: &'a mut [u32],
+    next: &'a mut [Way],
 }
 
 impl Stage<'_> {
@@ -353,31 +373,31 @@ impl Stage<'_> {
         let coast = -(level + f64::from(gear.points[level_point].drag)) / (inertia * self.step_e);
         let gained = self.rise - i as i32;
         let ceiling = f64::from(gained + of_time.len() as i32 - 1);
-        let first = (libm::ceil(coast.min(ceiling) - 1.5) as i32 - gained).max(0) as usize;
+        let first = (round_up(coast.min(ceiling) - 1.5) - gained).max(0) as usize;
         let h = self.h;
         let spare = (self.dither * inertia * self.step_e) as f32;
+        // Only where the gear drives at the mean energy.
         let count = of_time.len();
-        if first >= count {
+        let begin = first.max(gear.drives.0.saturating_sub(sum));
+        let end = count.min(gear.drives.1.saturating_sub(sum));
+        if begin >= end {
             return;
         }
-        let points = &gear.points[sum + first..sum + count];
-        for (((j, point), time), (cost, parent)) in
-            (first..count).zip(points).zip(&of_time[first..count]).zip(
-                self.next[first * self.gears + slot..]
-                    .iter_mut()
-                    .step_by(self.gears)
-                    .zip(self.parent[first * self.gears + slot..].iter_mut().step_by(self.gears)),
-            )
+        let points = &gear.points[sum + begin..sum + end];
+        let ways = &mut self.next[slot * count + begin..slot * count + end];
+        for (((j, point), time), way) in
+            (begin..end).zip(points).zip(&of_time[begin..end]).zip(ways)
         {
             let steps = gained + j as i32;
             let need = (level + slope * f64::from(steps)) as f32 + point.drag;
-            if need > point.limit + spare || point.limit < 0.0 {
+            if need > point.limit + spare {
                 if steps > 0 {
                     break;
                 }
                 continue;
             }
-            if f64::from(need) < -self.brake {
+            let before = base + time;
+            if before >= way.cost_g || f64::from(need) < -self.brake {
                 continue;
             }
             let fuel = if need > 0.0 || !self.free_cut {
@@ -385,10 +405,9 @@ impl Stage<'_> {
             } else {
                 0.0
             };
-            let total = base + fuel + time;
-            if total < *cost {
-                *cost = total;
-                *parent = code;
+            let total = before + fuel;
+            if total < way.cost_g {
+                *way = Way { cost_g: total, from: code };
             }
         }
     }

@@ -14,7 +14,6 @@ use super::gears::{GearChoice, choose_gears};
 use super::lin::{Terminal, TimeRule};
 use super::search::EngineTables;
 use super::solution::SolveStatus;
-use super::solver::DefaultSolver;
 use super::sqp::{CutModel, Iterations, Problem, Profile, Solver, iterate, refined_gears};
 use super::truck::{Drive, Truck};
 
@@ -35,110 +34,12 @@ pub struct TripRequest<'a> {
     pub tuning: Tuning,
 }
 
-/// Outcome of a valid request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TripStatus {
-    /// Optimal within tolerance.
-    Solved,
-    /// Usable, but the solver stopped early.
-    AlmostSolved,
-    /// No profile within the band is as fast as asked; the fastest is returned.
-    TripTimeNotReachable,
-    /// The solver failed; the set-speed cruise control is returned.
-    Fallback,
-}
-
-impl TripStatus {
-    /// The status as one word for files and screens.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Solved => "solved",
-            Self::AlmostSolved => "almost_solved",
-            Self::TripTimeNotReachable => "trip_time_not_reachable",
-            Self::Fallback => "fallback",
-        }
-    }
-}
-
-/// One row of `plan.csv`: state at `s_m`, forces and gear of the interval that begins there (the
-/// last row repeats the last interval's).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TripRow {
-    /// Station, m.
-    pub s_m: f64,
-    /// Speed, m/s.
-    pub v_m_s: f64,
-    /// Elapsed time, s.
-    pub time_s: f64,
-    /// Gear, 1-based, 0 = neutral.
-    pub gear: u8,
-    /// Wheel force of the driveline, N; negative in overrun.
-    pub drive_force_n: f64,
-    /// Brake force, N, positive slows.
-    pub brake_force_n: f64,
-    /// Fuel since the start, g.
-    pub fuel_g: f64,
-    /// Mean grade of the interval, rad.
-    pub grade_rad: f64,
-    /// Crank power, W.
-    pub engine_power_w: f64,
-}
-
-/// Totals of a driven trip.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TripTotals {
-    /// Fuel, g, shifts included.
-    pub fuel_g: f64,
-    /// Duration, s.
-    pub trip_time_s: f64,
-    /// Energy taken by the brakes, J.
-    pub brake_energy_j: f64,
-    /// Gear changes.
-    pub shifts: usize,
-}
-
-/// Effort and quality of the solution.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SolverReport {
-    /// Interior-point iterations in all.
-    pub iterations: u32,
-    /// Subproblems solved.
-    pub sqp_iterations: u32,
-    /// Largest violation of speed limits (m/s), power or brakes (m/s²) in the driven plan.
-    pub max_violation: f64,
-}
-
-/// A planned trip with its baselines.
-#[derive(Debug, Clone)]
-pub struct TripResult {
-    /// Outcome.
-    pub status: TripStatus,
-    /// Solver figures.
-    pub solver: SolverReport,
-    /// Totals of the plan.
-    pub plan: TripTotals,
-    /// Cruise control at the set speed, brakes at the set speed.
-    pub baseline_set_speed: TripTotals,
-    /// Cruise control at the set speed, brakes 5 km/h above it.
-    pub baseline_overspeed_5_km_h: TripTotals,
-    /// Fuel saved against the first baseline at its trip time, fraction.
-    pub saving_vs_set_speed_frac: f64,
-    /// Fuel saved against the second baseline at its trip time, fraction.
-    pub saving_vs_overspeed_frac: f64,
-    /// The plan, one row per node.
-    pub rows: Vec<TripRow>,
-    /// Set-speed baseline, one row per node.
-    pub baseline_rows: Vec<TripRow>,
-    /// Price of time at the optimum, g/s.
-    pub beta_g_s: f64,
-    /// Highest energy per node that law, curves and band allow, J/kg.
-    pub e_max_j_kg: Vec<f64>,
-}
-
 /// Successive linearisations with gears from a search: the first over the whole band, the others in
 /// a tube around the best so far.
 const TUBE_ROUNDS: usize = 2;
+
+/// Most subproblems that only tell the price of time, which the gear search is asked again with.
+const PROBES: usize = 2;
 
 /// Gain of a plan over cruise control, relative, below which cruise control is driven.
 const LEAST_GAIN: f64 = 1e-4;
@@ -256,32 +157,55 @@ impl Trip {
     }
 
     /// Solves for one trip time. The plan returned is driven, not promised: energies that the truth
-    /// reaches.
+    /// reaches. The profile's iterations and subproblems are all that it took to find it.
     pub fn solve(
         &self,
         trip_time_s: f64,
         end_e: f64,
         solver: &mut Solver<'_>,
     ) -> (Driven, Profile) {
-        self.solve_near(trip_time_s, end_e, self.beta_guess(), solver)
+        self.solve_near(trip_time_s, end_e, None, solver)
     }
 
-    /// [`Trip::solve`] with a guess of the price of time, g/s, from a similar trip time.
+    /// [`Trip::solve`], told the plan of a similar trip time.
     pub fn solve_near(
         &self,
         trip_time_s: f64,
         end_e: f64,
-        beta_g_s: f64,
+        near: Option<&Profile>,
+        solver: &mut Solver<'_>,
+    ) -> (Driven, Profile) {
+        let (mut iterations, mut subproblems) = (0, 0);
+        let (driven, mut profile) = self.solve_with(trip_time_s, end_e, near, &mut |a, b, c, d| {
+            let found = solver(a, b, c, d);
+            iterations += found.iterations;
+            subproblems += 1;
+            found
+        });
+        (profile.iterations, profile.subproblems) = (iterations, subproblems);
+        (driven, profile)
+    }
+
+    fn solve_with(
+        &self,
+        trip_time_s: f64,
+        end_e: f64,
+        near: Option<&Profile>,
         solver: &mut Solver<'_>,
     ) -> (Driven, Profile) {
         let mut problem = self.problem(trip_time_s, end_e);
         let cruise = (self.cruise.e_j_kg.as_slice(), self.cruise.drive.as_slice());
-        let mut beta = beta_g_s;
         let mut best: Option<(f64, Driven, Profile)> = None;
-        let (mut e, mut gears) = problem.first_profile(&self.tables, beta, 1.0, cruise);
-        for _ in 0..2 {
-            // One subproblem tells the price of time, which the gear search is asked again with.
-            let probe = Iterations { most: 1, ..Iterations::TRIP };
+        let probe = Iterations { most: 1, ..Iterations::TRIP };
+        let mut beta = self.beta_guess();
+        let (mut e, mut gears) = match near {
+            Some(plan) => {
+                beta = plan.beta_g_s;
+                (plan.e_j_kg.clone(), plan.gears.clone())
+            }
+            None => problem.first_profile(&self.tables, beta, 1.0, cruise),
+        };
+        for _ in 0..PROBES {
             let first = iterate(&problem, &e, &gears, beta, probe, solver);
             let settled = (first.beta_g_s - beta).abs() < 0.1 * beta;
             beta = first.beta_g_s;
@@ -395,89 +319,6 @@ impl Trip {
         }
     }
 
-    /// Totals of a driven trip.
-    #[must_use]
-    pub fn totals(&self, d: &Driven) -> TripTotals {
-        TripTotals {
-            fuel_g: d.total_fuel_g(),
-            trip_time_s: d.trip_time_s(),
-            brake_energy_j: d.brake_energy_j(self.truck.mass_kg, self.course.h_m),
-            shifts: d.shifts(),
-        }
-    }
-}
-
-/// Plans a trip and drives both baselines.
-///
-/// The plan meets the requested trip time, or that of the set-speed cruise control. Each saving is
-/// that of a plan solved for the baseline's own trip time and end speed.
-///
-/// # Errors
-/// [`PccError`] names the quantity of the request that is not usable, or the place that the truck
-/// cannot drive.
-pub fn plan_trip_with(
-    request: &TripRequest<'_>,
-    solver: &mut Solver<'_>,
-) -> Result<TripResult, PccError> {
-    let trip = Trip::new(request)?;
-    let end = |d: &Driven| d.e_j_kg[d.e_j_kg.len() - 1];
-    let against = |d: &Driven, beta_g_s: f64, solver: &mut Solver<'_>| {
-        let (goal, end) = (d.trip_time_s(), end(d).min(trip.end_cap()));
-        let (plan, profile) = trip.solve_near(goal, end, beta_g_s, solver);
-        let saved = 1.0 - plan.total_fuel_g() / d.total_fuel_g().max(1e-9);
-        (saved, plan, profile)
-    };
-    let (saving_cruise, mut plan, mut profile) = against(&trip.cruise, trip.beta_guess(), solver);
-    let beta = if profile.beta_g_s > 0.0 { profile.beta_g_s } else { trip.beta_guess() };
-    let (saving_over, ..) = against(&trip.overspeed, beta, solver);
-    let goal = request.trip_time_s.unwrap_or(trip.cruise.trip_time_s());
-    if request.trip_time_s.is_some() {
-        (plan, profile) = trip.solve_near(goal, end(&trip.cruise), beta, solver);
-    }
-    let mut status = match profile.status {
-        SolveStatus::Solved => TripStatus::Solved,
-        SolveStatus::AlmostSolved => TripStatus::AlmostSolved,
-        SolveStatus::Infeasible | SolveStatus::Failed => TripStatus::Fallback,
-    };
-    if status == TripStatus::Fallback {
-        plan = trip.cruise.clone();
-    }
-    if plan.trip_time_s() > goal * 1.002 {
-        status = TripStatus::TripTimeNotReachable;
-    }
-    Ok(TripResult {
-        status,
-        solver: SolverReport {
-            iterations: profile.iterations,
-            sqp_iterations: profile.subproblems,
-            max_violation: trip.violation(&plan),
-        },
-        plan: trip.totals(&plan),
-        baseline_set_speed: trip.totals(&trip.cruise),
-        baseline_overspeed_5_km_h: trip.totals(&trip.overspeed),
-        saving_vs_set_speed_frac: saving_cruise,
-        saving_vs_overspeed_frac: saving_over,
-        rows: trip.rows(&plan),
-        baseline_rows: trip.rows(&trip.cruise),
-        beta_g_s: profile.beta_g_s,
-        e_max_j_kg: trip.e_max,
-    })
-}
-
-/// [`plan_trip_with`] the [`DefaultSolver`].
-///
-/// # Errors
-/// As [`plan_trip_with`].
-pub fn plan_trip(request: &TripRequest<'_>) -> Result<TripResult, PccError> {
-    let mut solver = DefaultSolver::default();
-    plan_trip_with(request, &mut |sub, end, time, fence| solver.solve(sub, end, time, fence))
-}
-
-impl Trip {
-    fn end_cap(&self) -> f64 {
-        self.e_max[self.course.n()]
-    }
-
     /// Largest violation of the speed ceiling (m/s), full load or planned brakes (m/s²). The
     /// minimum speed is a wish, relaxed where the truck cannot hold it.
     #[must_use]
@@ -495,33 +336,5 @@ impl Trip {
             worst = worst.max(d.brake_m_s2[k] - self.course.brake_m_s2);
         }
         worst
-    }
-
-    /// The trip as rows, one per node.
-    #[must_use]
-    pub fn rows(&self, d: &Driven) -> Vec<TripRow> {
-        let n = self.course.n();
-        let m = self.truck.mass_kg;
-        (0..=n)
-            .map(|k| {
-                let i = k.min(n - 1);
-                let v = libm::sqrt(d.e_j_kg[i] + d.e_j_kg[i + 1]);
-                let overrun = match d.drive[i] {
-                    Drive::Gear(g) => self.truck.overrun_m_s2(g as usize, v),
-                    Drive::Neutral => 0.0,
-                };
-                TripRow {
-                    s_m: self.course.s_m(k),
-                    v_m_s: d.v_m_s(k),
-                    time_s: d.time_s[k],
-                    gear: d.drive[i].number(),
-                    drive_force_n: m * (d.p_m_s2[i] - overrun),
-                    brake_force_n: m * d.brake_m_s2[i],
-                    fuel_g: d.fuel_g[k],
-                    grade_rad: libm::asin(self.course.sin[i]),
-                    engine_power_w: self.truck.engine_power_w(d.drive[i], v, d.p_m_s2[i]),
-                }
-            })
-            .collect()
     }
 }

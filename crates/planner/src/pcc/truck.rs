@@ -20,6 +20,7 @@ use alloc::{format, vec::Vec};
 
 use tractrix_core::{Curve, FuelModel, GRAVITY_M_S2, VehicleLimits};
 
+use super::engine::TorqueCurves;
 use super::error::{PccError, check};
 
 /// Lowest engine speed under load, as a multiple of idle speed. Automated gearboxes shift down
@@ -60,8 +61,7 @@ pub struct Truck {
     efficiency_frac: Vec<f64>,
     inertia_factor: Vec<f64>,
     inertia_factor_neutral: f64,
-    full_load_nm: Curve,
-    friction_nm: Curve,
+    torque_nm: TorqueCurves,
     auxiliary_power_w: f64,
     min_speed_rad_s: f64,
     max_speed_rad_s: f64,
@@ -144,8 +144,7 @@ impl Truck {
             efficiency_frac: p.gear_efficiency_frac.clone(),
             inertia_factor: p.rotating_mass_kg.iter().map(|&r| inertia(r)).collect(),
             inertia_factor_neutral: inertia(p.rotating_mass_neutral_kg),
-            full_load_nm: p.full_load_nm.clone(),
-            friction_nm: p.friction_nm.clone(),
+            torque_nm: TorqueCurves::new(&p.full_load_nm, &p.friction_nm),
             auxiliary_power_w: p.auxiliary_power_w,
             min_speed_rad_s: p.idle_speed_rad_s * LUGGING_FACTOR,
             max_speed_rad_s: p.max_speed_rad_s,
@@ -196,44 +195,32 @@ impl Truck {
         (v * self.ratio_rad_m[g]).max(self.min_speed_rad_s)
     }
 
+    /// Engine and driveline in gear `g` at this speed.
+    #[must_use]
+    pub fn at(&self, g: usize, v_m_s: f64) -> Operating<'_> {
+        let speed_rad_s = self.engine_speed(g, v_m_s);
+        let torque = self.torque_nm.at(speed_rad_s);
+        Operating {
+            truck: self,
+            speed_rad_s,
+            auxiliary_nm: self.auxiliary_power_w / speed_rad_s,
+            full_load_nm: torque.full_load,
+            friction_nm: torque.friction,
+            ratio_rad_m: self.ratio_rad_m[g],
+            efficiency_frac: self.efficiency_frac[g],
+        }
+    }
+
     /// Overrun drag per mass at fuel cut-off, `D/m`, m/s².
     #[must_use]
     pub fn overrun_m_s2(&self, g: usize, v_m_s: f64) -> f64 {
-        self.drag_n(g, self.engine_speed(g, v_m_s)) / self.mass_kg
+        self.at(g, v_m_s).overrun_m_s2()
     }
 
     /// Largest specific indicated traction `φ = (F_max + D)/m`, m/s².
     #[must_use]
     pub fn traction_m_s2(&self, g: usize, v_m_s: f64) -> f64 {
-        self.forces_m_s2(g, v_m_s).1
-    }
-
-    /// Overrun drag at an engine speed, `D`, N.
-    fn drag_n(&self, g: usize, w: f64) -> f64 {
-        (self.friction_nm.at(w) + self.auxiliary_power_w / w) * self.ratio_rad_m[g]
-            / self.efficiency_frac[g]
-    }
-
-    /// Overrun drag and traction limit together, m/s²: as [`Truck::overrun_m_s2`] and
-    /// [`Truck::traction_m_s2`].
-    #[must_use]
-    pub fn forces_m_s2(&self, g: usize, v_m_s: f64) -> (f64, f64) {
-        let w = self.engine_speed(g, v_m_s);
-        let net = (self.full_load_nm.at(w) - self.auxiliary_power_w / w).max(0.0);
-        let drag = self.drag_n(g, w);
-        let pull = net * self.ratio_rad_m[g] * self.efficiency_frac[g];
-        (drag / self.mass_kg, (pull + drag) / self.mass_kg)
-    }
-
-    /// Indicated engine torque for specific traction `p`, Nm, with engine speed and friction torque.
-    fn indicated(&self, g: usize, v: f64, p: f64) -> (f64, f64, f64) {
-        let w = self.engine_speed(g, v);
-        let (i, eta) = (self.ratio_rad_m[g], self.efficiency_frac[g]);
-        let friction = self.friction_nm.at(w);
-        let loss = friction + self.auxiliary_power_w / w;
-        let force = p * self.mass_kg - loss * i / eta;
-        let net = if force >= 0.0 { force / (i * eta) } else { force * eta / i };
-        (w, net + loss, friction)
+        self.at(g, v_m_s).traction_m_s2()
     }
 
     /// Fuel flow, g/s, at specific traction `p >= 0`: the truth. Zero at cut-off.
@@ -241,25 +228,7 @@ impl Truck {
     pub fn fuel_g_s(&self, drive: Drive, v_m_s: f64, p_m_s2: f64) -> f64 {
         match drive {
             Drive::Neutral => self.idle_fuel_g_s,
-            Drive::Gear(g) => {
-                let (w, torque, friction) = self.indicated(g as usize, v_m_s, p_m_s2);
-                let torque = if torque < 1e-6 { 0.0 } else { torque };
-                self.fuel.rate_g_s(w, torque, friction)
-            }
-        }
-    }
-
-    /// Fuel flow, g/s, with the part that does not depend on torque charged at cut-off too: the
-    /// planning objective. A map that jumps when injection starts would otherwise make full power
-    /// and fuel cut-off by turns optimal on a flat road.
-    #[must_use]
-    pub fn fuel_charged_g_s(&self, drive: Drive, v_m_s: f64, p_m_s2: f64) -> f64 {
-        match drive {
-            Drive::Neutral => self.idle_fuel_g_s,
-            Drive::Gear(g) => {
-                let (w, torque, friction) = self.indicated(g as usize, v_m_s, p_m_s2);
-                self.fuel.rate_g_s(w, torque.max(1e-6), friction)
-            }
+            Drive::Gear(g) => self.at(g as usize, v_m_s).fuel_g_s(p_m_s2),
         }
     }
 
@@ -269,10 +238,16 @@ impl Truck {
         match drive {
             Drive::Neutral => self.auxiliary_power_w,
             Drive::Gear(g) => {
-                let (w, torque, friction) = self.indicated(g as usize, v_m_s, p_m_s2);
-                (torque - friction) * w
+                let at = self.at(g as usize, v_m_s);
+                (at.indicated_nm(p_m_s2) - at.friction_nm) * at.speed_rad_s
             }
         }
+    }
+
+    /// Fuel flow with the driveline open, g/s.
+    #[must_use]
+    pub fn idle_fuel_g_s(&self) -> f64 {
+        self.idle_fuel_g_s
     }
 
     /// The gear with the largest net traction at this speed, and that traction minus overrun drag
@@ -282,7 +257,8 @@ impl Truck {
         let mut best = (f64::MIN, 0);
         for g in 0..self.gears() {
             if self.usable(g, v_m_s) {
-                let pull = self.traction_m_s2(g, v_m_s) - self.overrun_m_s2(g, v_m_s);
+                let at = self.at(g, v_m_s);
+                let pull = at.traction_m_s2() - at.overrun_m_s2();
                 if pull > best.0 {
                     best = (pull, g);
                 }
@@ -302,6 +278,70 @@ impl Truck {
     #[must_use]
     pub fn top_speed_m_s(&self) -> f64 {
         (0..self.gears()).map(|g| self.speed_range_m_s(g).1).fold(0.0, f64::max)
+    }
+}
+
+/// Engine and driveline in one gear at one speed: what depends on both alone is read once.
+#[derive(Debug, Clone, Copy)]
+pub struct Operating<'a> {
+    truck: &'a Truck,
+    speed_rad_s: f64,
+    /// Torque of the auxiliaries, Nm.
+    auxiliary_nm: f64,
+    full_load_nm: f64,
+    friction_nm: f64,
+    ratio_rad_m: f64,
+    efficiency_frac: f64,
+}
+
+impl Operating<'_> {
+    /// Torque at the gearbox input that friction and auxiliaries take at fuel cut-off, Nm.
+    fn loss_nm(&self) -> f64 {
+        self.friction_nm + self.auxiliary_nm
+    }
+
+    /// Overrun drag, `D`, N.
+    fn drag_n(&self) -> f64 {
+        self.loss_nm() * self.ratio_rad_m / self.efficiency_frac
+    }
+
+    /// Overrun drag per mass at fuel cut-off, `D/m`, m/s².
+    #[must_use]
+    pub fn overrun_m_s2(&self) -> f64 {
+        self.drag_n() / self.truck.mass_kg
+    }
+
+    /// Largest specific indicated traction `φ = (F_max + D)/m`, m/s².
+    #[must_use]
+    pub fn traction_m_s2(&self) -> f64 {
+        let net = (self.full_load_nm - self.auxiliary_nm).max(0.0);
+        let pull = net * self.ratio_rad_m * self.efficiency_frac;
+        (pull + self.drag_n()) / self.truck.mass_kg
+    }
+
+    /// Indicated engine torque for specific traction `p`, Nm.
+    fn indicated_nm(&self, p_m_s2: f64) -> f64 {
+        let (i, eta) = (self.ratio_rad_m, self.efficiency_frac);
+        let force = p_m_s2 * self.truck.mass_kg - self.drag_n();
+        let net = if force >= 0.0 { force / (i * eta) } else { force * eta / i };
+        net + self.loss_nm()
+    }
+
+    /// Fuel flow, g/s, at specific traction `p >= 0`: the truth. Zero at cut-off.
+    #[must_use]
+    pub fn fuel_g_s(&self, p_m_s2: f64) -> f64 {
+        let torque = self.indicated_nm(p_m_s2);
+        let torque = if torque < 1e-6 { 0.0 } else { torque };
+        self.truck.fuel.rate_g_s(self.speed_rad_s, torque, self.friction_nm)
+    }
+
+    /// Fuel flow, g/s, with the part that does not depend on torque charged at cut-off too: the
+    /// planning objective. A map that jumps when injection starts would otherwise make full power
+    /// and fuel cut-off by turns optimal on a flat road.
+    #[must_use]
+    pub fn fuel_charged_g_s(&self, p_m_s2: f64) -> f64 {
+        let torque = self.indicated_nm(p_m_s2).max(1e-6);
+        self.truck.fuel.rate_g_s(self.speed_rad_s, torque, self.friction_nm)
     }
 }
 

@@ -26,11 +26,13 @@
 
 mod banded;
 mod newton;
+mod warm;
 
 use alloc::vec::Vec;
 
 use self::banded::Band;
 use self::newton::Eliminated;
+use self::warm::Kept;
 use super::lin::{Subproblem, Terminal, TimeRule};
 use super::quadratic::Quadratic;
 use super::solution::{Solution, SolveStatus};
@@ -97,6 +99,20 @@ struct SoftEnd {
     step: f64,
 }
 
+/// What each inequality of interval `k` leaves at `(E_k, E_{k+1}, b, u)` with traction `p`.
+fn room(sub: &Subproblem, k: usize, [e0, e1, b, u]: [f64; 4], p: f64) -> [f64; ROWS] {
+    [
+        p,
+        sub.phi0[k] + 0.5 * sub.phi1[k] * (e0 + e1) - p,
+        sub.b_max - b,
+        b,
+        sub.kink[k] - u,
+        p - u,
+        sub.e_max[k + 1] - e1,
+        e1 - sub.e_min[k + 1],
+    ]
+}
+
 /// Workspace; reuse it from solve to solve.
 #[derive(Debug, Clone, Default)]
 pub struct Structured {
@@ -121,6 +137,7 @@ pub struct Structured {
     known_time_s: f64,
     time: Option<Scalar>,
     soft: Option<SoftEnd>,
+    kept: Kept,
 }
 
 impl Structured {
@@ -134,12 +151,36 @@ impl Structured {
     ) {
         let beta = if let TimeRule::Price(beta) = time { beta } else { 0.0 };
         self.quad.assemble(sub, beta);
-        self.start(sub, terminal, time);
+        self.resize(sub.n);
+        self.duration_row(sub);
+        let (mut status, mut used) = (SolveStatus::Failed, 0);
+        if self.resume(sub, terminal, time) {
+            (status, used) = self.descend(sub, terminal, time, Some(warm::LIMITS));
+        }
+        if status != SolveStatus::Solved {
+            self.start(sub, terminal, time);
+            let (cold, more) = self.descend(sub, terminal, time, None);
+            (status, used) = (cold, used + more);
+        }
+        self.write(sub, time, status, used, out);
+    }
+
+    /// Iterates from the current point; how it ended, and the iterations used. `warm` says when a
+    /// warm start is given up.
+    fn descend(
+        &mut self,
+        sub: &Subproblem,
+        terminal: Terminal,
+        time: TimeRule,
+        warm: Option<warm::Limits>,
+    ) -> (SolveStatus, u32) {
         let fixed = matches!(terminal, Terminal::Fixed(_));
         let scale = self.quad.ge.iter().chain(&self.quad.gb).fold(1e-9, |a: f64, g| a.max(g.abs()));
         let mut status = SolveStatus::Failed;
         let mut used = 0;
-        for iteration in 0..=MAX_ITERATIONS {
+        let mut keep = true;
+        let most = warm.map_or(MAX_ITERATIONS, |limits| limits.iterations);
+        for iteration in 0..=most {
             used = iteration;
             let now = self.assemble(sub, terminal, time);
             if now.mu < MU_END && now.primal < PRIMAL_END && now.dual < DUAL_END * scale {
@@ -152,9 +193,17 @@ impl Structured {
                 status =
                     if now.primal > 1e-3 { SolveStatus::Infeasible } else { SolveStatus::Failed };
             }
-            let finite = now.mu.is_finite() && now.primal.is_finite() && now.dual.is_finite();
-            if !finite || iteration == MAX_ITERATIONS || !self.factor(fixed) {
+            let far = |w: warm::Limits| now.primal > w.primal || now.dual > w.dual * scale;
+            if iteration == 0 && warm.is_some_and(far) {
                 break;
+            }
+            let finite = now.mu.is_finite() && now.primal.is_finite() && now.dual.is_finite();
+            if !finite || iteration == most || !self.factor(fixed) {
+                break;
+            }
+            if keep && now.mu < warm::MU_KEPT {
+                self.keep(now.mu);
+                keep = false;
             }
             let (reach, product) = self.predict(sub, fixed);
             // Mean of (s + αds)(z + αdz), where s dz + z ds = -s z.
@@ -168,7 +217,7 @@ impl Structured {
                 break;
             }
         }
-        self.write(sub, time, status, used, out);
+        (status, used)
     }
 
     /// Number of inequalities.
@@ -202,10 +251,18 @@ impl Structured {
         self.parts.resize(n, Eliminated::default());
     }
 
+    /// The linearised duration as a row.
+    fn duration_row(&mut self, sub: &Subproblem) {
+        let n = sub.n;
+        self.known_time_s = sub.t0.iter().sum::<f64>() + sub.ta[0] * sub.start_e;
+        for k in 0..n {
+            let nodes = if k + 1 < n { sub.ta[k + 1] } else { 0.0 };
+            self.t[k] = sub.tb[k] + nodes;
+        }
+    }
+
     fn start(&mut self, sub: &Subproblem, terminal: Terminal, time: TimeRule) {
         let n = sub.n;
-        self.resize(n);
-        self.known_time_s = sub.t0.iter().sum::<f64>() + sub.ta[0] * sub.start_e;
         for k in 0..n {
             // Energies of the linearisation point at the interval's end, inside the bounds.
             let next =
@@ -215,8 +272,6 @@ impl Structured {
             self.e[k] = next.clamp(low + room, (high - room).max(low + room));
             self.b[k] = 0.02 * sub.b_max;
             self.u[k] = 0.5 * sub.kink[k];
-            let nodes = if k + 1 < n { sub.ta[k + 1] } else { 0.0 };
-            self.t[k] = sub.tb[k] + nodes;
         }
         let fixed = if let Terminal::Fixed(e) = terminal {
             self.e[n - 1] = e;
@@ -229,16 +284,7 @@ impl Structured {
         for k in 0..n {
             let (e1, b, u) = (self.e[k], self.b[k], self.u[k]);
             let p = sub.a0[k] * e0 + sub.a1[k] * e1 + b + sub.r[k];
-            let room = [
-                p,
-                sub.phi0[k] + 0.5 * sub.phi1[k] * (e0 + e1) - p,
-                sub.b_max - b,
-                b,
-                sub.kink[k] - u,
-                p - u,
-                sub.e_max[k + 1] - e1,
-                e1 - sub.e_min[k + 1],
-            ];
+            let room = room(sub, k, [e0, e1, b, u], p);
             let row = &mut self.rows[k];
             for (i, room) in room.into_iter().enumerate() {
                 row.s[i] = room.max(if i >= 6 { 0.5 } else { 0.02 });

@@ -41,9 +41,16 @@ fn times(a: &[f64; ROWS], b: &[f64; ROWS]) -> [f64; ROWS] {
     core::array::from_fn(|i| a[i] * b[i])
 }
 
+/// Entry by entry the larger one; nothing waits for the entry before.
 #[inline]
-fn largest(seen: f64, values: &[f64; ROWS]) -> f64 {
-    values.iter().fold(seen, |m, v| if v.abs() > m { v.abs() } else { m })
+fn raise(seen: &mut [f64; ROWS], values: [f64; ROWS]) {
+    for (m, v) in seen.iter_mut().zip(values) {
+        *m = if v > *m { v } else { *m };
+    }
+}
+
+fn largest(seen: &[f64; ROWS]) -> f64 {
+    seen.iter().fold(0.0, |m, v| if *v > m { *v } else { m })
 }
 
 impl Structured {
@@ -87,7 +94,8 @@ impl Structured {
         for (r, g) in self.base.iter_mut().zip(&self.grad_e) {
             *r = -g;
         }
-        let (mut primal, mut dual, mut sum, mut count) = (0.0f64, 0.0f64, 0.0, 8.0 * n as f64);
+        let (mut primals, mut sums) = ([0.0; ROWS], [0.0; ROWS]);
+        let (mut dual, mut count) = (0.0f64, (ROWS * n) as f64);
         let mut e0 = sub.start_e;
         for k in 0..n {
             let ended = fixed && k + 1 == n;
@@ -113,8 +121,10 @@ impl Structured {
                 (row.rp[6], row.rp[7]) = (0.0, 0.0);
                 (row.inverse_s[6], row.inverse_s[7]) = (0.0, 0.0);
             }
-            primal = largest(primal, &row.rp);
-            sum += times(&row.s, &row.z).iter().sum::<f64>();
+            raise(&mut primals, row.rp.map(f64::abs));
+            for (sum, product) in sums.iter_mut().zip(times(&row.s, &row.z)) {
+                *sum += product;
+            }
             let w = times(&row.z, &row.inverse_s);
             // Dual residual with z, right-hand side with W r_p.
             let (zp, zb, zu, ze) = gather(&row.z);
@@ -149,6 +159,7 @@ impl Structured {
             self.parts[k] = Eliminated { w5: w[5], inverse_u, x0, x1, inverse_b, right_u, right_b };
             e0 = e1;
         }
+        let (mut primal, mut sum) = (largest(&primals), sums.iter().sum::<f64>());
         if fixed {
             count -= 2.0;
         }
@@ -211,25 +222,27 @@ impl Structured {
             self.band.solve(&mut self.de);
         }
         self.border();
-        let (mut worst, mut product) = (0.0f64, 0.0);
+        let (mut worsts, mut products) = ([0.0; ROWS], [0.0; ROWS]);
         let mut before = 0.0;
         for k in 0..sub.n {
             let (part, row) = (&self.parts[k], &mut self.rows[k]);
             let de = self.de[k];
             let (_, _, step) = part.recover(sub, k, before, de);
-            for (i, step) in step.into_iter().enumerate() {
-                let ds = -row.rp[i] - step;
+            let mut ratios = [0.0; ROWS];
+            for i in 0..ROWS {
+                let ds = -row.rp[i] - step[i];
                 // -ds/s, and -dz/z = 1 + ds/s.
                 let ratio = ds * row.inverse_s[i];
-                let w_ds = row.z[i] * ratio;
+                let dz = -row.z[i] - row.z[i] * ratio;
                 row.ds[i] = ds;
-                row.dz[i] = -row.z[i] - w_ds;
-                product += ds * row.dz[i];
-                let ratio = if -ratio > 1.0 + ratio { -ratio } else { 1.0 + ratio };
-                worst = if ratio > worst { ratio } else { worst };
+                row.dz[i] = dz;
+                products[i] += ds * dz;
+                ratios[i] = if -ratio > 1.0 + ratio { -ratio } else { 1.0 + ratio };
             }
+            raise(&mut worsts, ratios);
             before = de;
         }
+        let (mut worst, mut product) = (largest(&worsts), products.iter().sum::<f64>());
         self.scalar_steps(|r| r.s * r.z);
         self.scalars(|r| {
             worst = worst.max(-r.ds / r.s).max(-r.dz / r.z);
@@ -284,7 +297,7 @@ impl Structured {
         self.de.copy_from_slice(&self.base);
         self.band.solve(&mut self.de);
         self.border();
-        let mut worst = 0.0f64;
+        let mut worsts = [0.0; ROWS];
         let mut before = 0.0;
         for k in 0..n {
             let (part, row) = (&self.parts[k], &mut self.rows[k]);
@@ -292,17 +305,19 @@ impl Structured {
             let (db, du, step) = part.recover(sub, k, before, de);
             self.db[k] = db;
             self.du[k] = du;
-            for (i, step) in step.into_iter().enumerate() {
-                let ds = -row.rp[i] - step;
+            let mut ratios = [0.0; ROWS];
+            for i in 0..ROWS {
+                let ds = -row.rp[i] - step[i];
                 let dz = -row.z[i] - (row.z[i] * ds + row.dz[i]) * row.inverse_s[i];
                 row.ds[i] = ds;
                 row.dz[i] = dz;
                 let (of_s, of_z) = (-ds * row.inverse_s[i], -dz / row.z[i]);
-                let ratio = if of_s > of_z { of_s } else { of_z };
-                worst = if ratio > worst { ratio } else { worst };
+                ratios[i] = if of_s > of_z { of_s } else { of_z };
             }
+            raise(&mut worsts, ratios);
             before = de;
         }
+        let mut worst = largest(&worsts);
         self.scalar_steps(|r| r.rc);
         self.scalars(|r| worst = worst.max(-r.ds / r.s).max(-r.dz / r.z));
         1.0 / worst.max(1e-12)
