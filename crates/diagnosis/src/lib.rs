@@ -33,6 +33,7 @@ mod report_models;
 mod search;
 mod sentence;
 mod stats;
+mod table_trial;
 mod unknown;
 
 pub use channel::Channel;
@@ -50,3 +51,4 @@ pub use plant::Plant;
 pub use read::{RawTable, read_drives, read_table};
 pub use replay::Module;
 pub use report_models::Models;
+pub use table_trial::{TableTrial, try_table};

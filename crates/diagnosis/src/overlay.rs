@@ -231,6 +231,7 @@ pub fn extend(
         base: base.to_owned(),
         name: name.to_owned(),
         set,
+        table_effects: Vec::new(),
     });
     Extension { overlay, not_carried }
 }
@@ -264,7 +265,13 @@ fn carried(
             set.insert(figure.path.to_owned(), OverlayValue { value, sigma, bounds, source });
         }
     }
-    let overlay = Overlay { schema: 1, base: String::new(), name: truck.name.clone(), set };
+    let overlay = Overlay {
+        schema: 1,
+        base: String::new(),
+        name: truck.name.clone(),
+        set,
+        table_effects: Vec::new(),
+    };
     let next = truck.with_overlay(&overlay).map_err(|e| e.to_string())?;
     Ok((overlay.set, next))
 }

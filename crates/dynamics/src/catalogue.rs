@@ -129,7 +129,13 @@ impl Cause {
             };
             set.insert(p.path.to_owned(), value);
         }
-        Ok(Overlay { schema: 1, base: truck.name.clone(), name: name.into(), set })
+        Ok(Overlay {
+            schema: 1,
+            base: truck.name.clone(),
+            name: name.into(),
+            set,
+            table_effects: Vec::new(),
+        })
     }
 }
 

@@ -1,7 +1,7 @@
 //! The truck: all effects in one step.
 //!
 //! ```text
-//! m_eff dv/dt = F_drive - F_retarder - F_brake - F_roll - F_air - F_grade - F_curve
+//! m_eff dv/dt = F_drive - F_retarder - F_brake - F_roll - F_air - F_grade - F_curve + F_table
 //! ```
 //! with the paths of `effects`: pedal → engine → clutch → gearbox → wheels, demand → pressure →
 //! force, wind and road → resistance; yaw and sideslip from [`crate::lateral`]. The step is a pure
@@ -9,12 +9,13 @@
 //! often it is called. At standstill brakes and rolling resistance hold the truck up to what they
 //! can, and no force moves it through zero backwards other than the grade and the driveline.
 
-use tractrix_core::{BrakeMode, Command, Curve, GRAVITY_M_S2, GearRequest};
+use tractrix_core::{BrakeMode, Command, Curve, GRAVITY_M_S2, GearRequest, RPM_PER_RAD_S};
 
 use crate::effects::brake::GROUPS;
 use crate::effects::engine::Engine;
 use crate::effects::resistance::{AirFlow, air_density_kg_m3};
 use crate::effects::shift::{ShiftPhase, ShiftState, TcuView};
+use crate::effects::table::{self, TableSignal};
 use crate::lateral::{AXLES, BodyForce, LateralInputs, LateralModel, LateralOutputs, LateralState};
 use crate::state::{Forces, RoadPatch, SUBSTEP_S, TruckState};
 use crate::{DynamicsError, TruckParameters};
@@ -23,6 +24,8 @@ use crate::{DynamicsError, TruckParameters};
 const GROUP_AXLES: [core::ops::Range<usize>; GROUPS] = [0..1, 1..3, 3..6];
 /// Speed below which static friction decides, m/s.
 const STANDSTILL_M_S: f64 = 1e-3;
+/// 0 °C in K.
+const ZERO_DEGC_K: f64 = 273.15;
 /// Coolant: time constant, s, rise per indicated power, K/W, level at no load above air, K.
 const COOLANT: (f64, f64, f64) = (240.0, 9.0e-5, 60.0);
 
@@ -36,6 +39,7 @@ pub struct TruckModel {
     /// Share of braking per axle group: its share of the load.
     pub(crate) brake_share: [f64; GROUPS],
     brake_table: Option<Curve>,
+    tables: Vec<(TableSignal, Curve)>,
     /// Engine speed per road speed in each gear, rad/m.
     ratio_rad_m: Vec<f64>,
     pedal_steps: u8,
@@ -65,6 +69,9 @@ impl TruckModel {
             .brake
             .pressure_table(parameters.lateral.total_mass_kg())
             .map_err(|e| refuse(&name, e.to_string()))?;
+        let tables: Result<Vec<_>, _> =
+            parameters.table_effects.iter().map(table::TableEffect::curve).collect();
+        let tables = tables.map_err(|e| refuse(&name, e.to_string()))?;
         let axle_load_n = parameters.lateral.static_axle_load_n();
         let total: f64 = axle_load_n.iter().sum();
         let gears = parameters.driveline.gear_ratios.len() as u8;
@@ -80,6 +87,7 @@ impl TruckModel {
             engine,
             lateral,
             brake_table,
+            tables,
             parameters,
         })
     }
@@ -106,7 +114,7 @@ impl TruckModel {
     #[must_use]
     pub fn initial_state(&self, x_m: f64, y_m: f64, yaw_rad: f64, speed_m_s: f64) -> TruckState {
         let idle = self.engine.idle_rad_s;
-        let up = self.parameters.shift.up_speed_rpm[0] / tractrix_core::RPM_PER_RAD_S;
+        let up = self.parameters.shift.up_speed_rpm[0] / RPM_PER_RAD_S;
         let fits = |i: &usize| speed_m_s * self.ratio_rad_m[*i] <= up;
         let top = self.ratio_rad_m.len() - 1;
         let first = usize::from(self.parameters.driveline.launch_gear) - 1;
@@ -443,7 +451,10 @@ impl TruckModel {
         let drive_n = wheel.drive_n.clamp(-drive_limit, drive_limit);
         axle_n[1] += 0.5 * (drive_n - retarder_n);
         axle_n[2] += 0.5 * (drive_n - retarder_n);
+        let effective_mass_kg =
+            self.mass_kg + d.rotating_mass_kg(self.parameters.engine.inertia_kg_m2, wheel.gear);
         let forces = Forces {
+            table_n: effective_mass_kg * self.table_accel_m_s2(s, command, patch),
             drive_n,
             retarder_n,
             brake_n,
@@ -451,10 +462,9 @@ impl TruckModel {
             drag_n: r.drag_n(&air),
             grade_n: self.mass_kg * GRAVITY_M_S2 * sin,
             curve_n: self.curve_drag_n(s),
-            effective_mass_kg: self.mass_kg
-                + d.rotating_mass_kg(self.parameters.engine.inertia_kg_m2, wheel.gear),
+            effective_mass_kg,
         };
-        let pushing = forces.drive_n - forces.drag_n - forces.grade_n;
+        let pushing = forces.drive_n - forces.drag_n - forces.grade_n + forces.table_n;
         let holding = forces.brake_n + forces.rolling_n + forces.retarder_n + forces.curve_n;
         let next = if v.abs() < STANDSTILL_M_S && pushing.abs() <= holding {
             0.0
@@ -490,6 +500,33 @@ impl TruckModel {
         let stiffness: f64 = self.lateral.yaw_sideslip().stiffness_n_rad.iter().sum();
         let accel = s.speed_m_s * s.lateral.yaw_rate_rad_s;
         self.parameters.resistance.curve_n(self.mass_kg, accel, stiffness)
+    }
+
+    /// Fitted tables at the present signals.
+    fn table_accel_m_s2(&self, s: &TruckState, command: &Command, patch: &RoadPatch) -> f64 {
+        if self.tables.is_empty() {
+            return 0.0;
+        }
+        let yaw_rate = s.lateral.yaw_rate_rad_s;
+        let reference_nm = self.parameters.engine.reference_torque_nm;
+        table::accel_m_s2(&self.tables, s.speed_m_s, |signal| match signal {
+            TableSignal::EngineSpeedRpm => s.engine_speed_rad_s * RPM_PER_RAD_S,
+            TableSignal::SpeedMS => s.speed_m_s,
+            TableSignal::Curvature1M => (yaw_rate / s.speed_m_s.max(1.0)).abs(),
+            TableSignal::GradeFrac => libm::tan(patch.grade_rad),
+            TableSignal::AmbientTempDegc => patch.air_temperature_k - ZERO_DEGC_K,
+            TableSignal::CoolantTempDegc => s.coolant_k - ZERO_DEGC_K,
+            TableSignal::AcceleratorPedalFrac => command.accelerator_pedal_frac,
+            TableSignal::BrakePressureKpa => 1e-3 * self.mean_pressure_pa(s),
+            TableSignal::GpsAltitudeM => patch.altitude_m,
+            TableSignal::Gear => f64::from(s.shift.gear),
+            TableSignal::EngineTorquePercent => 100.0 * s.engine_torque_nm / reference_nm,
+            TableSignal::EngineBrakeFrac => command.retarder_frac,
+            TableSignal::XbrDecelMS2 => command.xbr_decel_m_s2,
+            TableSignal::YawRateRadS => yaw_rate,
+            TableSignal::AccelYMS2 => s.speed_m_s * yaw_rate,
+            TableSignal::SteeringWheelRad => s.lateral.steering.wheel_rad,
+        })
     }
 
     fn slow_states(&self, s: &mut TruckState, patch: &RoadPatch) {

@@ -17,6 +17,7 @@ use crate::effects::engine::EngineParameters;
 use crate::effects::instruments::InstrumentParameters;
 use crate::effects::resistance::ResistanceParameters;
 use crate::effects::shift::ShiftParameters;
+use crate::effects::table::TableEffect;
 use crate::lateral::LateralParameters;
 
 const BUILTIN: [(&str, &str); 3] = [
@@ -52,6 +53,9 @@ pub struct TruckParameters {
     /// Faults of the instruments.
     #[serde(default)]
     pub instruments: InstrumentParameters,
+    /// Fitted tables for what no effect explains.
+    #[serde(default, rename = "table_effect", skip_serializing_if = "Vec::is_empty")]
+    pub table_effects: Vec<TableEffect>,
 }
 
 /// Outline of the bodies, for gaps, lanes and pictures.
@@ -82,6 +86,9 @@ pub struct Overlay {
     pub name: String,
     /// What is replaced, by dotted path, e.g. `resistance.rolling_coeff`.
     pub set: BTreeMap<String, OverlayValue>,
+    /// Fitted tables that come on top.
+    #[serde(default, rename = "table_effect", skip_serializing_if = "Vec::is_empty")]
+    pub table_effects: Vec<TableEffect>,
 }
 
 /// One replaced parameter.
@@ -171,6 +178,7 @@ impl TruckParameters {
                 other => other,
             })?;
         }
+        truck.table_effects.extend(overlay.table_effects.iter().cloned());
         truck.name.clone_from(&overlay.name);
         truck.checked(&overlay.name)
     }
@@ -216,6 +224,7 @@ impl TruckParameters {
         violations.extend(self.shift.violations(self.driveline.gear_ratios.len()));
         violations.extend(self.brake.violations());
         violations.extend(self.resistance.violations());
+        violations.extend(self.table_effects.iter().flat_map(TableEffect::violations));
         violations.extend(self.lateral.violations().into_iter().map(|v| format!("lateral.{v}")));
         if violations.is_empty() {
             Ok(self)

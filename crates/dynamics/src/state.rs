@@ -135,6 +135,8 @@ pub struct Forces {
     pub grade_n: f64,
     /// Induced drag of side forces.
     pub curve_n: f64,
+    /// Fitted tables, positive forward.
+    pub table_n: f64,
     /// Mass with rotating parts, kg.
     pub effective_mass_kg: f64,
 }

@@ -252,3 +252,34 @@ fn a_command_that_is_not_finite_is_refused_by_name() {
     let e = m.step(&m.initial_state(0.0, 0.0, 0.0, 1.0), &pedal(0.1), &patch, 0.01);
     assert!(e.unwrap_err().to_string().contains("longitudinal"));
 }
+
+#[test]
+fn a_fitted_table_in_an_overlay_pushes_by_its_acceleration() {
+    let base = TruckParameters::load("reference").unwrap();
+    let text = r#"schema = 1
+        base = "reference"
+        name = "with a table"
+        [set]
+        [[table_effect]]
+        source = "test: fitted over speed_m_s, cause unknown"
+        signal = "speed_m_s"
+        signal_values = [10.0, 20.0, 30.0]
+        accel_m_s2 = [0.0, -0.04, 0.0]"#;
+    let overlay: dynamics::Overlay = toml::from_str(text).unwrap();
+    let with = base.with_overlay(&overlay).unwrap();
+    let again: TruckParameters = toml::from_str(&toml::to_string(&with).unwrap()).unwrap();
+    assert_eq!(again, with);
+    let (m, plain) = (TruckModel::new(with, 36_000.0).unwrap(), truck(36_000.0));
+    for (speed, accel) in [(10.0, 0.0), (15.0, -0.02), (20.0, -0.04)] {
+        let s = m.initial_state(0.0, 0.0, 0.0, speed);
+        let patch = RoadPatch::default();
+        let (a, b) =
+            (run(&m, &s, &neutral(), &patch, 0.5), run(&plain, &s, &neutral(), &patch, 0.5));
+        assert!(((a.speed_m_s - b.speed_m_s) / 0.5 - accel).abs() < 5e-4, "{speed}");
+    }
+    let rest = m.initial_state(0.0, 0.0, 0.0, 0.0);
+    assert_eq!(run(&m, &rest, &neutral(), &RoadPatch::default(), 5.0).speed_m_s, 0.0);
+    let wrong = text.replace("[0.0, -0.04, 0.0]", "[0.0, -0.04]");
+    let error = base.with_overlay(&toml::from_str(&wrong).unwrap()).unwrap_err().to_string();
+    assert!(error.contains("table_effect.accel_m_s2"), "{error}");
+}

@@ -6,3 +6,4 @@ pub mod engine;
 pub mod instruments;
 pub mod resistance;
 pub mod shift;
+pub mod table;

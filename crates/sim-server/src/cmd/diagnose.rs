@@ -43,6 +43,10 @@ pub(crate) struct Args {
     /// the seed draws, diagnoses it, and runs the simulator with the extended truck.
     #[arg(long, conflicts_with_all = ["truck", "drives", "baseline"])]
     example: bool,
+    /// Adds what is left without a name to the extended truck, as a table over the signal that it
+    /// follows, if that helps on every drive held out.
+    #[arg(long)]
+    table_effect: bool,
     /// Seed of the example, and of the intervals of the gain.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -88,7 +92,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         diagnosis::report::report(&plant, &drives, baseline.as_ref(), &options, &found, args.seed)
             .map_err(Failure::work)?;
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
+    let table = args.table_effect.then(|| {
+        let origin = format!("diagnosis of {} on {}", found.truck, named(&drives_at));
+        diagnosis::try_table(&truck, &drives, &options, &found, &origin, &threads)
+    });
+    let table = table.transpose().map_err(Failure::input)?;
     let mut results = Results::new(found, figures, named(&drives_at), args.seed);
+    results.table = table;
     results.extend(&truck, truck_name, &args.out)?;
     if let Some(hidden) = hidden {
         stages.show("running the simulator with the extended truck");

@@ -1,11 +1,12 @@
 //! What a diagnosis writes and says: `diagnosis.json`, `report.html`, the extended truck file, and
 //! sentences for a terminal.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use diagnosis::report::Report;
-use diagnosis::{Diagnosis, Extension, Verdict};
-use dynamics::TruckParameters;
+use diagnosis::{Diagnosis, Extension, TableTrial, Verdict};
+use dynamics::{Overlay, TruckParameters};
 use serde_json::{Value, json};
 
 use super::example::{ClosedLoop, Hidden};
@@ -18,6 +19,8 @@ pub(super) struct Results {
     found: Diagnosis,
     figures: Report,
     pub(super) extension: Extension,
+    /// What is left without a name, tried as a table.
+    pub(super) table: Option<TableTrial>,
     /// What was hidden, and the trip that closes the loop.
     pub(super) example: Option<(Hidden, ClosedLoop)>,
     drives: String,
@@ -28,7 +31,7 @@ impl Results {
     /// Of drives with this name.
     pub(super) fn new(found: Diagnosis, figures: Report, drives: String, seed: u64) -> Self {
         let extension = Extension { overlay: None, not_carried: Vec::new() };
-        Self { found, figures, extension, example: None, drives, seed }
+        Self { found, figures, extension, table: None, example: None, drives, seed }
     }
 
     /// Writes the extended truck (and the truck file that it builds on, if it is not built in),
@@ -45,6 +48,16 @@ impl Results {
         let origin = format!("diagnosis of {} on {}", self.found.truck, self.drives);
         let extended = format!("{name}.extended");
         self.extension = diagnosis::extend(truck, &base, &extended, &self.found.causes, &origin);
+        if let Some(effect) = self.table.as_ref().and_then(|t| t.effect.clone()) {
+            let overlay = self.extension.overlay.get_or_insert_with(|| Overlay {
+                schema: 1,
+                base: base.clone(),
+                name: extended.clone(),
+                set: BTreeMap::new(),
+                table_effects: Vec::new(),
+            });
+            overlay.table_effects.push(effect);
+        }
         self.found.extended_truck = None;
         if let Some(overlay) = &self.extension.overlay {
             if !built_in {
@@ -90,6 +103,10 @@ impl Results {
                 let errors = serde_json::to_value(&self.figures.gains).map_err(Failure::work)?;
                 gain.insert("errors".to_owned(), errors);
             }
+            if let Some(table) = &self.table {
+                let table = serde_json::to_value(table).map_err(Failure::work)?;
+                all.insert("table_effect".to_owned(), table);
+            }
             if let Some((hidden, _)) = &self.example {
                 let hidden = serde_json::to_value(hidden).map_err(Failure::work)?;
                 all.insert("hidden".to_owned(), hidden);
@@ -113,6 +130,7 @@ impl Results {
             let signals = u.signals.join(", ");
             lines.push(format!("  outside the catalogue: {}; it follows {signals}", u.shape));
         }
+        lines.extend(self.table.as_ref().map(tried));
         if let Some(g) = &found.gain {
             let held_out = g.held_out.join(", ");
             let mut claimed = figures.gains.iter().filter(|g| g.claimed).peekable();
@@ -166,6 +184,18 @@ impl Results {
 /// A truck's name as a file name.
 fn file_name(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
+}
+
+/// What came of the table as a sentence.
+fn tried(table: &TableTrial) -> String {
+    let speed = table.speed_rmse_m_s.map_or_else(String::new, |e| {
+        let on = table.held_out.join(", ");
+        format!(" (speed over 60 s on {on}: error {:.3} to {:.3} m/s)", e.before, e.after)
+    });
+    match &table.why_not {
+        None => format!("  a fitted table of it is in the extended truck, cause unknown{speed}"),
+        Some(why) => format!("  no table of it is in the extended truck: {why}{speed}"),
+    }
 }
 
 /// The verdict as a sentence.
