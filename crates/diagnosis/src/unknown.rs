@@ -1,6 +1,8 @@
 //! What is left outside the catalogue: a smooth, free function of one measured signal in one
 //! module, as a Gaussian-process spline over hat functions, judged by the same evidence.
 
+use std::collections::HashMap;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::drive::Drive;
@@ -72,6 +74,16 @@ fn own(module: Module, signal: &str) -> bool {
 /// Excess of the whitened variance over drives in order that no tolerance explains.
 const RESTLESS: f64 = 1.1;
 
+/// Means of a signal over rows of `step` samples.
+fn means(d: &Prepared, read: Read, step: usize) -> Vec<f64> {
+    (0..d.n.div_ceil(step))
+        .map(|k| {
+            let (from, to) = (k * step, (k * step + step).min(d.n));
+            (from..to).map(|i| read(d, i)).sum::<f64>() / (to - from).max(1) as f64
+        })
+        .collect()
+}
+
 impl Problem<'_> {
     /// A disturbance that follows no measured signal: more variance than drives in order have, in
     /// tractor and trailer yaw alike (gusts), or far more in one module. The module that shows it
@@ -102,7 +114,8 @@ impl Problem<'_> {
 
     /// The best free-form functions at `theta`, one per module and signal, best first.
     pub(crate) fn shapes(&self, theta: &Theta) -> Vec<Shape> {
-        let residuals: Vec<Rest> = (0..self.drives.len()).map(|i| self.rest(i, theta)).collect();
+        let residuals: Vec<Rest> = self.each(|i| self.rest(i, theta));
+        let mut rows_of: HashMap<(usize, &str), Vec<Vec<f64>>> = HashMap::new();
         let mut out = Vec::new();
         for (module, size) in SEARCHED {
             let m = *module as usize;
@@ -114,7 +127,11 @@ impl Problem<'_> {
                 if own(*module, signal) {
                     continue;
                 }
-                if let Some(s) = self.shape(*module, *size, signal, *read, &residuals) {
+                let step = module.row_step();
+                let values = rows_of
+                    .entry((step, *signal))
+                    .or_insert_with(|| self.each(|i| means(&self.drives[i], *read, step)));
+                if let Some(s) = self.shape(*module, *size, signal, values, &residuals) {
                     out.push(s);
                 }
             }
@@ -128,43 +145,32 @@ impl Problem<'_> {
         module: Module,
         size: f64,
         signal: &'static str,
-        read: Read,
+        values: &[Vec<f64>],
         residuals: &[Rest],
     ) -> Option<Shape> {
         let m = module as usize;
-        let step = module.row_step();
-        let value = |d: &Prepared, k: usize| {
-            let from = k * step;
-            let to = (from + step).min(d.n);
-            (from..to).map(|i| read(d, i)).sum::<f64>() / (to - from).max(1) as f64
-        };
         let (mut lo, mut hi) = (f64::INFINITY, f64::NEG_INFINITY);
-        for d in &self.drives {
-            for (k, ok) in d.valid[m].iter().enumerate() {
-                if *ok {
-                    let x = value(d, k);
-                    lo = lo.min(x);
-                    hi = hi.max(x);
-                }
+        for (d, values) in self.drives.iter().zip(values) {
+            for (x, _) in values.iter().zip(&d.valid[m]).filter(|(_, ok)| **ok) {
+                lo = lo.min(*x);
+                hi = hi.max(*x);
             }
         }
         let width = (hi - lo) / (KNOTS - 1) as f64;
         if width <= 1e-9 || !width.is_finite() {
             return None;
         }
-        let mut total = DMatrix::zeros(KNOTS + 1, KNOTS + 1);
-        for (i, d) in self.drives.iter().enumerate() {
-            let places: Vec<Option<(usize, f64)>> = d.valid[m]
-                .iter()
-                .enumerate()
-                .map(|(k, ok)| {
-                    let x = ((value(d, k) - lo) / width).clamp(0.0, (KNOTS - 1) as f64);
-                    let j = (x as usize).min(KNOTS - 2);
-                    ok.then_some((j, x - j as f64))
-                })
-                .collect();
-            total += self.hats(i, m, &places, &residuals[i]);
-        }
+        let parts = self.each(|i| {
+            let place = |(x, ok): (&f64, &bool)| {
+                let x = ((x - lo) / width).clamp(0.0, (KNOTS - 1) as f64);
+                let j = (x as usize).min(KNOTS - 2);
+                ok.then_some((j, x - j as f64))
+            };
+            let places: Vec<Option<(usize, f64)>> =
+                values[i].iter().zip(&self.drives[i].valid[m]).map(place).collect();
+            self.hats(i, m, &places, &residuals[i])
+        });
+        let total = parts.iter().fold(DMatrix::zeros(KNOTS + 1, KNOTS + 1), |sum, g| sum + g);
         let kernel = DMatrix::from_fn(KNOTS, KNOTS, |i, j| {
             let x = (i as f64 - j as f64) / (KNOTS - 1) as f64 / LENGTH;
             (-0.5 * x * x).exp() + if i == j { 1e-3 } else { 0.0 }

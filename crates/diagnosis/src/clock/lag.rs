@@ -23,13 +23,16 @@ pub(super) struct WindowLag {
 
 /// Normalised correlation of `x[from + stride i]` with `y` `lag` samples earlier.
 fn correlation(r: &Rates, range: core::ops::Range<usize>, lag: i64, stride: usize) -> f64 {
+    let last = (r.y.len() as i64 + lag).clamp(0, range.end as i64) as usize;
+    let before = usize::try_from(lag - range.start as i64).unwrap_or(0).div_ceil(stride) * stride;
+    let first = range.start + before;
+    let (x, y) = match (r.x.get(first..last), usize::try_from(first as i64 - lag)) {
+        (Some(x), Ok(from)) => (x, r.y.get(from..).unwrap_or_default()),
+        _ => return 0.0,
+    };
     let (mut n, mut sx, mut sy) = (0.0_f64, 0.0, 0.0);
     let (mut xy, mut xx, mut yy) = (0.0, 0.0, 0.0);
-    for i in range.step_by(stride) {
-        let Some(y) = usize::try_from(i as i64 - lag).ok().and_then(|j| r.y.get(j)) else {
-            continue;
-        };
-        let x = r.x[i];
+    for (x, y) in x.iter().step_by(stride).zip(y.iter().step_by(stride)) {
         n += 1.0;
         sx += x;
         sy += y;

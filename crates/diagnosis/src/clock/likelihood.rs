@@ -128,7 +128,7 @@ impl Fit {
         let half = 0.5 * range.len() as f64 * Rates::STEP_S;
         // Drift is scaled by the half length so that all columns have like size.
         let mut p = Vector4::new(start.0, start.1 * half, 1.0, 0.0);
-        let mut covariance = Matrix4::zeros();
+        let mut last = None;
         for iteration in 0..ITERATIONS {
             let mut ok = Vec::with_capacity(range.len());
             let mut columns: [Vec<f64>; 4] = Default::default();
@@ -163,9 +163,7 @@ impl Fit {
             }
             let gradient = Vector4::from_fn(|i, _| dot(&white[i], &e));
             let step = information.cholesky()?.solve(&gradient);
-            let bend: [f64; 3] = core::array::from_fn(|k| dot(&noise.apply(&bends[k], &ok), &e));
-            covariance = sandwich(information, bend, &white, &e, drifts)
-                .or_else(|| sandwich(information, [0.0; 3], &white, &e, drifts))?;
+            last = Some((noise, ok, bends, information, white, e));
             // The likelihood is a parabola only within the correlation length of the rates.
             let limit = (0.5 / step[0].abs().max(step[1].abs())).min(1.0);
             p += step * limit;
@@ -173,6 +171,12 @@ impl Fit {
                 break;
             }
         }
+        let (noise, ok, bends, information, white, e) = last?;
+        let bend: [f64; 3] = core::array::from_fn(|k| {
+            noise.apply(&bends[k], &ok).iter().zip(&e).map(|(a, b)| a * b).sum::<f64>()
+        });
+        let covariance = sandwich(information, bend, &white, &e, drifts)
+            .or_else(|| sandwich(information, [0.0; 3], &white, &e, drifts))?;
         let (lag_s, drift_s_s) = (p[0], if drifts { p[1] / half } else { 0.0 });
         let fit = Self {
             lag_s,

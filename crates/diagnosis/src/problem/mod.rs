@@ -130,7 +130,8 @@ impl<'a> Problem<'a> {
         Ok(problem)
     }
 
-    fn each<T: Send>(&self, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    /// Runs `f` for every drive, by the executor.
+    pub(crate) fn each<T: Send>(&self, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
         let slots: Vec<std::sync::Mutex<Option<T>>> =
             self.drives.iter().map(|_| std::sync::Mutex::new(None)).collect();
         self.executor.run(self.drives.len(), &|i| {

@@ -15,24 +15,26 @@ use crate::{Drive, Plant};
 pub(super) const EDGE: usize = 4;
 
 /// Samples that are computed side by side.
-const BLOCK: usize = 32;
+pub(super) const BLOCK: usize = 128;
 
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[super::Module::Force as usize];
     let model = Longitudinal::new(d, plant, t);
     let scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
-    let mut sum = Vec::with_capacity(d.balance.padded + 1);
+    let mut sum = d.profiles.scratch();
+    sum.resize(d.balance.padded + 1, 0.0);
     let mut total = 0.0;
-    sum.push(total);
-    for at in (0..d.balance.padded).step_by(BLOCK) {
-        let speed = cut::<BLOCK>(&d.balance.speed, at).map(|v| v * scale);
-        sum.extend(model.acceleration(at, &speed).map(|a| {
+    for (at, sums) in (0..d.balance.padded).step_by(BLOCK).zip(sum[1..].chunks_exact_mut(BLOCK)) {
+        let speed: [f64; BLOCK] = scaled(cut(&d.balance.speed, at), scale);
+        for (a, s) in model.acceleration(at, &speed).iter().zip(sums) {
             total += a * Drive::STEP_S;
-            total
-        }));
+            *s = total;
+        }
     }
     let lag = t[P::SpeedLag as usize] / Drive::STEP_S;
-    weak_form(valid, &d.speed, scale, &sum[..=d.n], lag)
+    let out = weak_form(valid, &d.speed, scale, &sum[..=d.n], lag);
+    d.profiles.give_back(sum);
+    out
 }
 
 /// Measured change of the quantity over a second minus the change of `sum`.
@@ -128,6 +130,21 @@ fn cut<const L: usize>(x: &[f64], at: usize) -> &[f64; L] {
     x.get(at..).and_then(<[f64]>::first_chunk).unwrap_or(&[0.0; L])
 }
 
+/// One value per sample of a block; a loop, which the compiler makes wide.
+#[inline(always)]
+fn lanes<const L: usize>(f: impl Fn(usize) -> f64) -> [f64; L] {
+    let mut out = [0.0; L];
+    for (j, x) in out.iter_mut().enumerate() {
+        *x = f(j);
+    }
+    out
+}
+
+#[inline(always)]
+fn scaled<const L: usize>(x: &[f64; L], factor: f64) -> [f64; L] {
+    lanes(|j| x[j] * factor)
+}
+
 /// Longitudinal balance of one drive with its parameters unpacked.
 pub(crate) struct Longitudinal<'a> {
     d: &'a Inputs,
@@ -197,7 +214,7 @@ impl<'a> Longitudinal<'a> {
         let (indicated, friction) = (cut::<L>(&d.indicated_nm, at), cut::<L>(&d.friction_nm, at));
         let (auxiliary, brake) = (cut::<L>(&d.auxiliary_nm, at), cut::<L>(&d.engine_brake_nm, at));
         let ratio = cut::<L>(&d.ratio_1_m, at);
-        let mut net: [f64; L] = core::array::from_fn(|j| {
+        let mut net: [f64; L] = lanes(|j| {
             indicated[j] * self.torque
                 - friction[j] * self.friction
                 - auxiliary[j]
@@ -211,7 +228,7 @@ impl<'a> Longitudinal<'a> {
         }
         let (eta, back) = (self.efficiency, 1.0 / self.efficiency);
         let mut force: [f64; L] =
-            core::array::from_fn(|j| net[j] * ratio[j] * if net[j] > 0.0 { eta } else { back });
+            lanes(|j| net[j] * ratio[j] * if net[j] > 0.0 { eta } else { back });
         let air = self.air(at, v);
         let mut rolling = [self.rolling; L];
         if let Some(cold) = &self.cold_left {
@@ -227,7 +244,7 @@ impl<'a> Longitudinal<'a> {
             force[j] -= air[j] + resistance;
         }
         let pressure = cut::<L>(&self.pressure, at);
-        let mut service: [f64; L] = core::array::from_fn(|j| self.brake_n_kpa * pressure[j]);
+        let mut service: [f64; L] = lanes(|j| self.brake_n_kpa * pressure[j]);
         if let Some(heat) = &self.heat {
             let (heat, ambient) = (cut::<L>(heat, at), cut::<L>(&d.ambient, at));
             for j in 0..L {
@@ -238,8 +255,8 @@ impl<'a> Longitudinal<'a> {
         let (stage, xbr) = (cut::<L>(&d.engine_brake_frac, at), cut::<L>(&d.xbr, at));
         let (coasts, rotating) = (cut::<L>(&d.coasts, at), cut::<L>(&d.rotating_kg, at));
         let [on_stage, on_coast, on_brake] = self.retarder;
-        core::array::from_fn(|j| {
-            let coasting = if v[j] > 8.0 { on_coast * coasts[j] } else { 0.0 };
+        lanes(|j| {
+            let coasting = on_coast * coasts[j] * if v[j] > 8.0 { 1.0 } else { 0.0 };
             let retarder = on_stage * stage[j] + coasting + on_brake * xbr[j];
             (force[j] - service[j] - retarder - self.parasitic_n) / (self.mass_kg + rotating[j])
         })
@@ -250,13 +267,11 @@ impl<'a> Longitudinal<'a> {
         let density = cut::<L>(&self.d.density, at);
         let (along, across) = self.wind.over(self.d, at, v);
         if self.wind.still() {
-            return core::array::from_fn(|j| {
-                0.5 * density[j] * self.cd_a_m2 * along[j].abs() * along[j]
-            });
+            return lanes(|j| 0.5 * density[j] * self.cd_a_m2 * along[j].abs() * along[j]);
         }
-        let tan: [f64; L] = core::array::from_fn(|j| across[j].abs() / along[j].abs().max(1.0));
+        let tan: [f64; L] = lanes(|j| across[j].abs() / along[j].abs().max(1.0));
         let yaw = arctangents(tan);
-        core::array::from_fn(|j| {
+        lanes(|j| {
             0.5 * density[j]
                 * self.cd_a_m2
                 * (1.0 + self.drag_yaw_1_rad * yaw[j])
@@ -290,7 +305,7 @@ impl Wind {
     /// Air speed relative to the truck: against the direction of travel, and to the left, m/s.
     #[inline(always)]
     fn over<const L: usize>(&self, d: &Inputs, at: usize, v: &[f64; L]) -> ([f64; L], [f64; L]) {
-        let mut along = v.map(|v| v + self.head);
+        let mut along: [f64; L] = lanes(|j| v[j] + self.head);
         let mut across = [self.to_left; L];
         if self.to != [0.0, 0.0] {
             let (sin, cos) = (cut::<L>(&d.sin, at), cut::<L>(&d.cos, at));
@@ -304,33 +319,50 @@ impl Wind {
     }
 }
 
-/// Side force of the wind on the whole truck at the measured speed, N, positive to the left;
-/// `None` where nothing blows.
-pub(super) fn side_force(d: &Prepared, plant: &Plant, t: &Theta) -> Option<Vec<f64>> {
-    let wind = Wind::new(t);
-    let area_m2_rad = plant.side_area_m2_per_deg.to_degrees();
-    let scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
-    let block = |at: usize| -> [f64; BLOCK] {
-        let v = cut::<BLOCK>(&d.balance.speed, at).map(|v| v * scale);
-        let (along, across) = wind.over(&d.balance, at, &v);
-        let tan: [f64; BLOCK] = core::array::from_fn(|j| across[j].abs() / along[j].max(1.0));
+/// Side force of the wind on the whole truck at the measured speed.
+pub(super) struct SideForce<'a> {
+    d: &'a Inputs,
+    wind: Wind,
+    area_m2_rad: f64,
+    speed_scale: f64,
+}
+
+impl<'a> SideForce<'a> {
+    pub(super) fn new(d: &'a Prepared, plant: &Plant, t: &Theta) -> Self {
+        Self {
+            d: &d.balance,
+            wind: Wind::new(t),
+            area_m2_rad: plant.side_area_m2_per_deg.to_degrees(),
+            speed_scale: 1.0 / (1.0 + t[P::SpeedScale as usize]),
+        }
+    }
+
+    /// Force at the samples from `at` on, N, positive to the left.
+    #[inline(always)]
+    pub(super) fn block(&self, at: usize) -> [f64; BLOCK] {
+        if self.wind.still() {
+            return [0.0; BLOCK];
+        }
+        let v: [f64; BLOCK] = scaled(cut(&self.d.speed, at), self.speed_scale);
+        let (along, across) = self.wind.over(self.d, at, &v);
+        let tan: [f64; BLOCK] = lanes(|j| across[j].abs() / along[j].max(1.0));
         let yaw = arctangents(tan);
-        let density = cut::<BLOCK>(&d.balance.density, at);
-        core::array::from_fn(|j| {
+        let density = cut::<BLOCK>(&self.d.density, at);
+        lanes(|j| {
             let squared = along[j] * along[j] + across[j] * across[j];
-            (0.5 * density[j] * squared * area_m2_rad * yaw[j]).copysign(across[j])
+            (0.5 * density[j] * squared * self.area_m2_rad * yaw[j]).copysign(across[j])
         })
-    };
-    (!wind.still()).then(|| (0..d.balance.padded).step_by(BLOCK).flat_map(block).collect())
+    }
 }
 
 /// Arctangents of positive numbers; by their series where all are small, as those of air yaw are.
 #[inline(always)]
 fn arctangents<const L: usize>(x: [f64; L]) -> [f64; L] {
     if x.iter().fold(0.0, |a: f64, b| a.max(*b)) > 0.1 {
-        return x.map(f64::atan);
+        return lanes(|j| x[j].atan());
     }
-    x.map(|x| {
+    lanes(|j| {
+        let x = x[j];
         let y = x * x;
         // the next term is below 1e-16 of the first
         let mut sum = 1.0 / 15.0;

@@ -5,7 +5,7 @@ use dynamics::lateral::{LateralParameters, StateSpace, YawSideslip};
 use tractrix_core::GRAVITY_M_S2;
 
 use super::Module as M;
-use super::force::side_force;
+use super::force::{BLOCK, SideForce};
 use super::prepared::Prepared;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
@@ -94,15 +94,8 @@ fn rate(a: &[State; 4], s: &State, u: &State) -> State {
     plus(&left, &right, 1.0)
 }
 
-/// Tractor yaw rate, trailer yaw rate and lateral acceleration of every sample, without the
-/// instruments' offsets.
-struct Motion {
-    yaw: Vec<f64>,
-    trailer_yaw: Vec<f64>,
-    accel_y: Vec<f64>,
-}
-
-fn motion(d: &Prepared, plant: &Plant, t: &Theta, samples: usize) -> Motion {
+/// Residuals of tractor yaw rate, trailer yaw rate and lateral acceleration, mean of two samples.
+pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3] {
     let p = loaded(d, plant, t);
     let mut model = YawSideslip::new(&p);
     model.stiffness_n_rad = stiffness(d, plant, t);
@@ -111,7 +104,7 @@ fn motion(d: &Prepared, plant: &Plant, t: &Theta, samples: usize) -> Motion {
         *c *= 1.0 + scale[[0, 1, 1, 2, 2, 2][axle]];
     }
     let system = BySpeed::new(&model);
-    let road_wheel = road_wheel(d, plant, t);
+    let mut road_wheel = RoadWheel::new(d, plant, t);
     let bank_m_s2 = GRAVITY_M_S2 * t[P::Bank as usize];
     // The bank pulls on both bodies, and the wind pushes them in a fixed proportion.
     let bank = plus(
@@ -121,73 +114,82 @@ fn motion(d: &Prepared, plant: &Plant, t: &Theta, samples: usize) -> Motion {
     );
     let share = plant.side_force_tractor_frac;
     let wind = plus(&system.tractor.map(|b| share * b), &system.trailer, 1.0 - share);
-    let side_force = side_force(d, plant, t);
+    let side_force = SideForce::new(d, plant, t);
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
+    let bias = [P::YawBias, P::TrailerYawBias, P::AccelYBias].map(|p| t[p as usize]);
     let dt = Drive::STEP_S;
-    let mut out = Motion {
-        yaw: Vec::with_capacity(samples),
-        trailer_yaw: Vec::with_capacity(samples),
-        accel_y: Vec::with_capacity(samples),
-    };
+    let rows = (d.n / 2).saturating_sub(2);
+    let mut out = [vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]];
     let mut s: State = [0.0; 4];
-    for ((i, speed), wheel) in (0..samples).zip(&d.speed).zip(road_wheel.windows(2)) {
-        let v = (speed * speed_scale).max(MIN_SPEED_M_S);
-        let a = system.at(v);
-        let side = side_force.as_ref().map_or(bank, |f| plus(&bank, &wind, f[i]));
-        let input = |delta: f64| plus(&side, &system.steer, delta);
-        let (u0, u1) = (input(wheel[0]), input(wheel[1]));
-        let um = input(0.5 * (wheel[0] + wheel[1]));
-        let k1 = rate(&a, &s, &u0);
-        out.yaw.push(s[1]);
-        out.trailer_yaw.push(s[2]);
-        out.accel_y.push(k1[0] + v * s[1] + bank_m_s2);
-        let k2 = rate(&a, &plus(&s, &k1, 0.5 * dt), &um);
-        let k3 = rate(&a, &plus(&s, &k2, 0.5 * dt), &um);
-        let k4 = rate(&a, &plus(&s, &k3, dt), &u1);
-        let sum: State = core::array::from_fn(|j| k1[j] + 2.0 * (k2[j] + k3[j]) + k4[j]);
-        s = plus(&s, &sum, dt / 6.0).map(|x| x.clamp(-50.0, 50.0));
+    let mut next = road_wheel.step(0);
+    for from in (0..2 * rows).step_by(BLOCK) {
+        let force = side_force.block(from);
+        for (i, force) in (from..2 * rows).zip(force) {
+            let v = (d.speed[i] * speed_scale).max(MIN_SPEED_M_S);
+            let a = system.at(v);
+            let side = plus(&bank, &wind, force);
+            let before = next;
+            next = road_wheel.step(i + 1);
+            let u0 = plus(&side, &system.steer, before);
+            let um = plus(&side, &system.steer, 0.5 * (before + next));
+            let u1 = plus(&side, &system.steer, next);
+            let k1 = rate(&a, &s, &u0);
+            let lateral = k1[0] + v * s[1] + bank_m_s2;
+            out[0][i / 2] += 0.5 * (d.yaw[i] - s[1] - bias[0]);
+            out[1][i / 2] += 0.5 * (d.trailer_yaw[i] - s[2] - bias[1]);
+            out[2][i / 2] += 0.5 * (d.accel_y[i] - lateral - bias[2]);
+            let k2 = rate(&a, &plus(&s, &k1, 0.5 * dt), &um);
+            let k3 = rate(&a, &plus(&s, &k2, 0.5 * dt), &um);
+            let k4 = rate(&a, &plus(&s, &k3, dt), &u1);
+            let sum: State = core::array::from_fn(|j| k1[j] + 2.0 * (k2[j] + k3[j]) + k4[j]);
+            s = plus(&s, &sum, dt / 6.0).map(|x| x.clamp(-50.0, 50.0));
+        }
+    }
+    for (m, r) in [M::Yaw, M::TrailerYaw, M::AccelY].iter().zip(&mut out) {
+        for (x, ok) in r.iter_mut().zip(&d.valid[*m as usize]) {
+            if !ok {
+                *x = 0.0;
+            }
+        }
     }
     out
 }
 
-/// Residuals of tractor yaw rate, trailer yaw rate and lateral acceleration, mean of two samples.
-pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3] {
-    let rows = (d.n / 2).saturating_sub(2);
-    let motion = motion(d, plant, t, 2 * rows);
-    [
-        (M::Yaw, &d.yaw, &motion.yaw, P::YawBias),
-        (M::TrailerYaw, &d.trailer_yaw, &motion.trailer_yaw, P::TrailerYawBias),
-        (M::AccelY, &d.accel_y, &motion.accel_y, P::AccelYBias),
-    ]
-    .map(|(m, measured, modelled, bias)| {
-        let mut out = vec![0.0; rows];
-        let pairs = measured.chunks_exact(2).zip(modelled.chunks_exact(2));
-        for ((x, ok), (a, b)) in out.iter_mut().zip(&d.valid[m as usize]).zip(pairs) {
-            if *ok {
-                *x = 0.5 * (a[0] + a[1] - b[0] - b[1]) - t[bias as usize];
-            }
-        }
-        out
-    })
+/// Road-wheel angle of sample after sample: dead time, free play, offset, ratio, lag.
+struct RoadWheel<'a> {
+    steer: &'a [f64],
+    keep: f64,
+    ratio: f64,
+    offset: f64,
+    play: f64,
+    gear: f64,
+    angle: f64,
 }
 
-/// Road-wheel angle of every sample: dead time, free play, offset, ratio, lag.
-fn road_wheel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
-    let steering = &plant.lateral.steering;
-    let lag = steering.lag_s + t[P::SteerLag as usize];
-    let keep = if lag > 1e-3 { (-Drive::STEP_S / lag).exp() } else { 0.0 };
-    let ratio = steering.ratio * (1.0 + t[P::SteerRatio as usize]);
-    let offset = steering.offset_rad + t[P::SteerOffset as usize];
-    let play = 0.5 * (steering.free_play_rad + t[P::FreePlay as usize]).max(0.0);
-    let mut gear = d.steer[0];
-    let mut angle = (gear - offset) / ratio;
-    d.steer
-        .iter()
-        .map(|wheel| {
-            gear = gear.clamp(wheel - play, wheel + play);
-            let target = (gear - offset) / ratio;
-            angle = target + (angle - target) * keep;
-            angle
-        })
-        .collect()
+impl<'a> RoadWheel<'a> {
+    fn new(d: &'a Prepared, plant: &Plant, t: &Theta) -> Self {
+        let steering = &plant.lateral.steering;
+        let lag = steering.lag_s + t[P::SteerLag as usize];
+        let ratio = steering.ratio * (1.0 + t[P::SteerRatio as usize]);
+        let offset = steering.offset_rad + t[P::SteerOffset as usize];
+        let gear = d.steer[0];
+        Self {
+            steer: &d.steer,
+            keep: if lag > 1e-3 { (-Drive::STEP_S / lag).exp() } else { 0.0 },
+            ratio,
+            offset,
+            play: 0.5 * (steering.free_play_rad + t[P::FreePlay as usize]).max(0.0),
+            gear,
+            angle: (gear - offset) / ratio,
+        }
+    }
+
+    #[inline(always)]
+    fn step(&mut self, i: usize) -> f64 {
+        let wheel = self.steer[i];
+        self.gear = self.gear.clamp(wheel - self.play, wheel + self.play);
+        let target = (self.gear - self.offset) / self.ratio;
+        self.angle = target + (self.angle - target) * self.keep;
+        self.angle
+    }
 }

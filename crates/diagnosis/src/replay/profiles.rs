@@ -30,9 +30,9 @@ const KEPT: usize = 28;
 
 type Entry = (Kind, [u64; 2], Arc<[f64]>);
 
-/// The kept signals of one drive, the latest at the end.
+/// The kept signals of one drive, the latest at the end, and memory to work in.
 #[derive(Debug, Default)]
-pub(crate) struct Profiles(Mutex<Vec<Entry>>);
+pub(crate) struct Profiles(Mutex<Vec<Entry>>, Mutex<Vec<Vec<f64>>>);
 
 impl Profiles {
     /// The signal at two parameter values, built where it is not kept.
@@ -59,5 +59,17 @@ impl Profiles {
             kept.push((kind, key, signal.clone()));
         }
         signal
+    }
+
+    /// A vector of any content that has room already: fresh memory of this size costs as much as the
+    /// balance that fills it.
+    pub(super) fn scratch(&self) -> Vec<f64> {
+        self.1.lock().ok().and_then(|mut s| s.pop()).unwrap_or_default()
+    }
+
+    pub(super) fn give_back(&self, used: Vec<f64>) {
+        if let Ok(mut spare) = self.1.lock() {
+            spare.push(used);
+        }
     }
 }
