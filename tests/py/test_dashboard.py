@@ -263,3 +263,24 @@ def test_other_web_sites_cannot_ask(server: Path, tmp_path: Path) -> None:
             urllib.request.urlopen(run.url + "/api/v1/control", body, timeout=10)
         assert refused.value.code == 400
         assert "fly" in json.load(refused.value)["error"]
+
+
+def test_the_report_of_the_trucks_diagnosis_is_linked_and_served(
+    server: Path, tmp_path: Path, page: Page
+) -> None:
+    truck = tmp_path / "reference.extended.toml"
+    overlay = {"value": 6.8, "source": "test"}
+    lines = [f"{key} = {json.dumps(value)}" for key, value in overlay.items()]
+    head = 'schema = 1\nbase = "reference"\nname = "extended"\n'
+    truck.write_text(
+        head + '[set."resistance.drag_area_m2"]\n' + "\n".join(lines) + "\n"
+    )
+    (tmp_path / "report.html").write_text("<!doctype html><h1>Air drag</h1>")
+    options = ["highway-empty", "--truck", str(truck)]
+    with running(server, tmp_path / "run", *options) as run:
+        page.goto(run.url)
+        page.click("#report")
+        assert page.inner_text("h1") == "Air drag"
+    with running(server, tmp_path / "plain", "highway-empty") as run:
+        page.goto(run.url)
+        page.wait_for_selector("#report", state="hidden")

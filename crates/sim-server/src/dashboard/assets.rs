@@ -15,9 +15,16 @@ const STRIPS: &str = include_str!("page/strips.js");
 
 static PLOTLY: LazyLock<String> = LazyLock::new(plotly_js);
 
-/// One embedded file by its path; none if there is no such file.
-pub(super) fn asset(path: &str) -> Option<Response> {
+/// The link to the report, hidden and shown.
+const LINK: [&str; 2] =
+    ["<a id=\"report\" href=\"/report\" hidden>", "<a id=\"report\" href=\"/report\">"];
+static HTML_WITH_REPORT: LazyLock<String> = LazyLock::new(|| HTML.replace(LINK[0], LINK[1]));
+
+/// One embedded file by its path; none if there is no such file. The page links to a report if
+/// there is one.
+pub(super) fn asset(path: &str, report: bool) -> Option<Response> {
     let (kind, body): (_, &'static str) = match path {
+        "/" if report => ("text/html; charset=utf-8", HTML_WITH_REPORT.as_str()),
         "/" => ("text/html; charset=utf-8", HTML),
         "/assets/style.css" => ("text/css; charset=utf-8", STYLE),
         "/assets/app.js" => (SCRIPT, APP),

@@ -33,18 +33,25 @@ pub(crate) struct Shared {
     summary: Mutex<Arc<str>>,
     /// The road as JSON; does not change.
     road: Arc<str>,
+    /// The report of the diagnosis that the truck comes from, as a page.
+    report: Option<Arc<str>>,
     /// To the world's thread.
     controls: ControlSender,
 }
 
 impl Shared {
     /// Nothing published yet.
-    pub(crate) fn new(road_json: String, controls: ControlSender) -> Arc<Self> {
+    pub(crate) fn new(
+        road_json: String,
+        report: Option<String>,
+        controls: ControlSender,
+    ) -> Arc<Self> {
         Arc::new(Self {
             frame: watch::Sender::new(Arc::from("")),
             strip: Mutex::default(),
             summary: Mutex::new(Arc::from("{}")),
             road: road_json.into(),
+            report: report.map(Arc::from),
             controls,
         })
     }

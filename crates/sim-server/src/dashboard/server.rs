@@ -4,10 +4,10 @@ use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
 
 use axum::Router;
-use axum::extract::Request;
+use axum::extract::{Request, State};
 use axum::http::{HeaderMap, StatusCode, Uri, header};
 use axum::middleware::{self, Next};
-use axum::response::{IntoResponse, Response};
+use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 
 use super::{Shared, api, assets, socket};
@@ -58,14 +58,22 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/api/v1/road", get(api::road))
         .route("/api/v1/health", get(api::health))
         .route("/api/v1/control", post(api::control))
+        .route("/report", get(report))
         .route("/ws", get(socket::upgrade))
         .fallback(page)
         .layer(middleware::from_fn(local_only))
         .with_state(shared)
 }
 
-async fn page(uri: Uri) -> Response {
-    assets::asset(uri.path()).unwrap_or_else(|| StatusCode::NOT_FOUND.into_response())
+async fn page(State(shared): State<Arc<Shared>>, uri: Uri) -> Response {
+    assets::asset(uri.path(), shared.report.is_some())
+        .unwrap_or_else(|| StatusCode::NOT_FOUND.into_response())
+}
+
+/// The report of the diagnosis that the truck comes from.
+async fn report(State(shared): State<Arc<Shared>>) -> Response {
+    let page = |text: &Arc<str>| Html(text.to_string()).into_response();
+    shared.report.as_ref().map_or_else(|| StatusCode::NOT_FOUND.into_response(), page)
 }
 
 /// Refuses requests that another web site makes through the user's browser: a foreign `Host`

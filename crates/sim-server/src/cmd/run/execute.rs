@@ -47,6 +47,8 @@ struct TrafficSummary {
     failure: Option<String>,
 }
 
+/// Longest report that the dashboard serves.
+const MAX_REPORT_BYTES: u64 = 64 << 20;
 /// Viewers get this long to take the last frame before the server goes.
 const LAST_FRAME_TIME: Duration = Duration::from_millis(200);
 
@@ -58,9 +60,10 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     let provenance = Provenance::of_seed(seed);
     let combination = Combination::new(world.truck().limits());
     let (controls, received) = driver::channel();
-    let shared = listener
-        .is_some()
-        .then(|| Shared::new(dashboard::road_json(world.road(), &combination), controls.clone()));
+    let shared = listener.is_some().then(|| {
+        let road = dashboard::road_json(world.road(), &combination);
+        Shared::new(road, report_of(&scenario.truck.file), controls.clone())
+    });
     let publisher = shared.as_ref().map(|shared| {
         let road = Arc::clone(world.road());
         Publisher::new(Arc::clone(shared), provenance, scenario, road)
@@ -102,6 +105,14 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     let (summary, json) = result?;
     report(args.json, &summary, &json, &folder);
     Ok(())
+}
+
+/// The report of the diagnosis that wrote a truck file: it lies beside it.
+fn report_of(truck: &str) -> Option<String> {
+    let page = Path::new(truck).parent()?.join("report.html");
+    let small = |m: &std::fs::Metadata| m.is_file() && m.len() <= MAX_REPORT_BYTES;
+    let extended = truck.ends_with(".extended.toml") && page.metadata().as_ref().is_ok_and(small);
+    extended.then(|| std::fs::read_to_string(page).ok()).flatten()
 }
 
 /// `--out`, or a folder that does not exist yet: `runs/SCENARIO-SEED`, `runs/SCENARIO-SEED-2`, …
