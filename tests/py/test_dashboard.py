@@ -275,12 +275,15 @@ def test_the_report_of_the_trucks_diagnosis_is_linked_and_served(
     truck.write_text(
         head + '[set."resistance.drag_area_m2"]\n' + "\n".join(lines) + "\n"
     )
-    (tmp_path / "report.html").write_text("<!doctype html><h1>Air drag</h1>")
+    icon = '<link rel="icon" href="data:,">'
+    (tmp_path / "report.html").write_text(f"<!doctype html>{icon}<h1>Air drag</h1>")
     options = ["highway-empty", "--truck", str(truck)]
     with running(server, tmp_path / "run", *options) as run:
         page.goto(run.url)
+        page.wait_for_selector("#strips .trace", state="attached")
         page.click("#report")
         assert page.inner_text("h1") == "Air drag"
     with running(server, tmp_path / "plain", "highway-empty") as run:
         page.goto(run.url)
-        page.wait_for_selector("#report", state="hidden")
+        page.wait_for_selector("#strips .trace", state="attached")
+        assert page.is_hidden("#report")
