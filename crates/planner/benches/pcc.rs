@@ -11,6 +11,7 @@ mod data_sheet;
 mod replan;
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use planner::pcc::clarabel_backend::Clarabel;
 use planner::pcc::lin::Subproblem;
 use planner::pcc::solution::Solution;
 use planner::pcc::solver::DefaultSolver;
@@ -55,7 +56,11 @@ fn trips(c: &mut Criterion) {
             });
         });
         group.bench_function(format!("{name}/clarabel"), |b| {
-            b.iter(|| black_box(plan_trip_with(request, &mut clarabel_backend::solve)));
+            let mut library = Clarabel::default();
+            b.iter(|| {
+                let mut solve = |a: &_, b, c, d: Option<&[f64]>| library.solve(a, b, c, d);
+                black_box(plan_trip_with(request, &mut solve))
+            });
         });
     });
     group.finish();
@@ -84,9 +89,11 @@ fn replans(c: &mut Criterion) {
             });
         });
         group.bench_function(format!("{name}/clarabel"), |b| {
+            let mut library = Clarabel::default();
             b.iter(|| {
                 at = (at + 1) % windows.len();
-                black_box(windows[at].replan(&trip, &mut clarabel_backend::solve))
+                let mut solve = |a: &_, b, c, d: Option<&[f64]>| library.solve(a, b, c, d);
+                black_box(windows[at].replan(&trip, &mut solve))
             });
         });
     });

@@ -12,8 +12,9 @@ mod data_sheet;
 #[path = "../tests/support/pcc/replan.rs"]
 mod replan;
 
-use planner::pcc::clarabel_backend::{self, Programme};
+use planner::pcc::clarabel_backend;
 use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
+use planner::pcc::programme::Programme;
 use planner::pcc::solution::Solution;
 use planner::pcc::structured::Structured;
 use planner::pcc::trip::{Trip, TripRequest};

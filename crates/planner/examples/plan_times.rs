@@ -14,6 +14,7 @@ mod data_sheet;
 #[path = "../tests/support/pcc/replan.rs"]
 mod replan;
 
+use planner::pcc::clarabel_backend::Clarabel;
 use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
 use planner::pcc::solution::{Solution, SolveStatus};
 use planner::pcc::solver::DefaultSolver;
@@ -99,8 +100,12 @@ fn main() {
                 }
                 found
             });
+            let mut library = Clarabel::default();
+            let mut by_library = |a: &Subproblem, b: Terminal, c: TimeRule, d: Option<&[f64]>| {
+                library.solve(a, b, c, d)
+            };
             let t = now_ms();
-            plan_trip_with(&request, &mut clarabel_backend::solve).unwrap();
+            plan_trip_with(&request, &mut by_library).unwrap();
             let clarabel = now_ms() - t;
             println!(
                 "{name:9} {:2.0} | {prepare:6.2} {solve:6.2} {whole:6.2} | {calls:2} {iterations:3} {inside:6.2} {second} | {clarabel:7.1}",
@@ -122,7 +127,7 @@ fn main() {
                 of_structured.push(now_ms() - t);
                 of_both += opinions;
                 let t = now_ms();
-                window.replan(&trip, &mut clarabel_backend::solve);
+                window.replan(&trip, &mut by_library);
                 of_clarabel.push(now_ms() - t);
             }
         }

@@ -1,8 +1,6 @@
 //! The subproblem through Clarabel (interior point, homogeneous embedding): default and oracle.
 //!
-//! Unknowns `E_1..E_N`, `b_0..b_{N-1}`, `u_0..u_{N-1}`, then one slack of a soft end, then `t_1..t_N` when a fence
-//! asks for elapsed times. Clarabel cannot start from the last solution (0.11); a solve costs the
-//! same every time.
+//! Clarabel cannot start from the last solution (0.11): a solve takes the same iterations every time.
 
 use alloc::vec::Vec;
 
@@ -13,220 +11,12 @@ use clarabel::solver::{
 };
 
 use super::lin::{Subproblem, Terminal, TimeRule};
-use super::quadratic::Quadratic;
+use super::programme::{Programme, Rows};
 use super::solution::{Solution, SolveStatus};
 
-/// A quadratic programme `min ½xᵀPx + qᵀx, Ax + s = b, s ∈ {0}^z × R₊^m` in triplets, for Clarabel
-/// and for writing out.
-#[derive(Debug, Clone, Default)]
-pub struct Programme {
-    /// Number of unknowns.
-    pub columns: usize,
-    /// Upper triangle of P: row, column, value.
-    pub p: (Vec<usize>, Vec<usize>, Vec<f64>),
-    /// Linear cost.
-    pub q: Vec<f64>,
-    /// A: row, column, value.
-    pub a: (Vec<usize>, Vec<usize>, Vec<f64>),
-    /// Right-hand side.
-    pub b: Vec<f64>,
-    /// Leading rows that are equalities.
-    pub equalities: usize,
-}
-
-/// Rows of the inequality blocks, for reading the multipliers back.
-struct Rows {
-    p_low: usize,
-    p_high: usize,
-    u_low: usize,
-    time: Option<usize>,
-}
-
-impl Programme {
-    fn entry(&mut self, row: usize, column: usize, value: f64) {
-        self.a.0.push(row);
-        self.a.1.push(column);
-        self.a.2.push(value);
-    }
-
-    fn cost(&mut self, row: usize, column: usize, value: f64) {
-        let (i, j) = if row <= column { (row, column) } else { (column, row) };
-        self.p.0.push(i);
-        self.p.1.push(j);
-        self.p.2.push(value);
-    }
-
-    /// Writes the subproblem as matrices. `fence_s` are earliest times per node (`-∞`: none).
-    #[must_use]
-    pub fn new(
-        sub: &Subproblem,
-        terminal: Terminal,
-        time: TimeRule,
-        fence_s: Option<&[f64]>,
-    ) -> Self {
-        Self::build(sub, terminal, time, fence_s).0
-    }
-
-    fn build(
-        sub: &Subproblem,
-        terminal: Terminal,
-        time: TimeRule,
-        fence_s: Option<&[f64]>,
-    ) -> (Self, Rows) {
-        let n = sub.n;
-        let mut m = Self::default();
-        let soft = matches!(terminal, Terminal::Soft { .. });
-        let slack = 3 * n;
-        let t_first = 3 * n + usize::from(soft);
-        m.columns = t_first + if fence_s.is_some() { n } else { 0 };
-        let mut quad = Quadratic::default();
-        quad.assemble(sub, if let TimeRule::Price(beta) = time { beta } else { 0.0 });
-        m.q = alloc::vec![0.0; m.columns];
-        for i in 0..n {
-            m.cost(i, i, quad.d0[i]);
-            if i + 1 < n {
-                m.cost(i, i + 1, quad.d1[i]);
-            }
-            if i + 2 < n {
-                m.cost(i, i + 2, quad.d2[i]);
-            }
-            m.cost(n + i, n + i, quad.bb[i]);
-            m.cost(i, n + i, quad.x1[i]);
-            if i > 0 {
-                m.cost(i - 1, n + i, quad.x0[i]);
-            }
-            m.q[i] = quad.ge[i];
-            m.q[n + i] = quad.gb[i];
-            m.q[2 * n + i] = -sub.discount[i];
-        }
-        // Equalities first.
-        let mut row = 0;
-        if let Terminal::Fixed(e) = terminal {
-            m.entry(row, n - 1, 1.0);
-            m.b.push(e);
-            row += 1;
-        }
-        if fence_s.is_some() {
-            for k in 0..n {
-                // t_{k+1} - t_k - ta E_k - tb E_{k+1} = t0
-                m.entry(row, t_first + k, 1.0);
-                m.entry(row, k, -sub.tb[k]);
-                let mut right = sub.t0[k];
-                if k == 0 {
-                    right += sub.ta[0] * sub.start_e;
-                } else {
-                    m.entry(row, t_first + k - 1, -1.0);
-                    m.entry(row, k - 1, -sub.ta[k]);
-                }
-                m.b.push(right);
-                row += 1;
-            }
-        }
-        m.equalities = row;
-        let rows = m.inequalities(sub, terminal, time, row);
-        if let Some(fence) = fence_s {
-            let mut row = m.b.len();
-            for k in 0..n {
-                if fence[k + 1].is_finite() {
-                    m.entry(row, t_first + k, -1.0);
-                    m.b.push(-fence[k + 1]);
-                    row += 1;
-                }
-            }
-        }
-        if let Terminal::Soft { pay, credit, .. } = terminal {
-            m.q[slack] = pay - credit;
-            m.q[n - 1] -= credit;
-        }
-        (m, rows)
-    }
-
-    fn inequalities(
-        &mut self,
-        sub: &Subproblem,
-        terminal: Terminal,
-        time: TimeRule,
-        first: usize,
-    ) -> Rows {
-        let n = sub.n;
-        let (p_low, p_high) = (first, first + n);
-        for k in 0..n {
-            // -p <= 0
-            self.entry(p_low + k, k, -sub.a1[k]);
-            self.entry(p_low + k, n + k, -1.0);
-            let known = if k == 0 { sub.a0[0] * sub.start_e } else { 0.0 };
-            if k > 0 {
-                self.entry(p_low + k, k - 1, -sub.a0[k]);
-            }
-            self.b.push(sub.r[k] + known);
-        }
-        for k in 0..n {
-            // p - phi1 Ē <= phi0
-            let half = 0.5 * sub.phi1[k];
-            self.entry(p_high + k, k, sub.a1[k] - half);
-            self.entry(p_high + k, n + k, 1.0);
-            let mut right = sub.phi0[k] - sub.r[k];
-            if k > 0 {
-                self.entry(p_high + k, k - 1, sub.a0[k] - half);
-            } else {
-                right -= (sub.a0[0] - half) * sub.start_e;
-            }
-            self.b.push(right);
-        }
-        let u_low = first + 2 * n;
-        for k in 0..n {
-            // u - p <= 0
-            self.entry(u_low + k, 2 * n + k, 1.0);
-            self.entry(u_low + k, k, -sub.a1[k]);
-            self.entry(u_low + k, n + k, -1.0);
-            let known = if k == 0 { sub.a0[0] * sub.start_e } else { 0.0 };
-            if k > 0 {
-                self.entry(u_low + k, k - 1, -sub.a0[k]);
-            }
-            self.b.push(sub.r[k] + known);
-        }
-        let mut row = first + 3 * n;
-        let mut bound = |m: &mut Self, column: usize, sign: f64, right: f64| {
-            m.entry(row, column, sign);
-            m.b.push(right);
-            row += 1;
-        };
-        let last_free = if matches!(terminal, Terminal::Fixed(_)) { n - 1 } else { n };
-        for i in 0..last_free {
-            bound(self, i, 1.0, sub.e_max[i + 1]);
-            bound(self, i, -1.0, -sub.e_min[i + 1]);
-        }
-        for k in 0..n {
-            bound(self, n + k, 1.0, sub.b_max);
-            bound(self, n + k, -1.0, 0.0);
-            bound(self, 2 * n + k, 1.0, sub.kink[k]);
-        }
-        if let Terminal::Soft { reference, .. } = terminal {
-            // s >= 0 and s + E_N >= reference
-            bound(self, 3 * n, -1.0, 0.0);
-            bound(self, 3 * n, -1.0, -reference);
-            let row = self.b.len() - 1;
-            self.entry(row, n - 1, -1.0);
-        }
-        let time_row = if let TimeRule::AtMost(t) = time {
-            let row = self.b.len();
-            let mut right = t;
-            for k in 0..n {
-                let next = if k + 1 < n { sub.ta[k + 1] } else { 0.0 };
-                self.entry(row, k, sub.tb[k] + next);
-                right -= sub.t0[k];
-            }
-            right -= sub.ta[0] * sub.start_e;
-            self.b.push(right);
-            Some(row)
-        } else {
-            None
-        };
-        Rows { p_low, p_high, u_low, time: time_row }
-    }
-}
-
-/// Clarabel's settings: quiet, single-threaded, and with a fixed pattern.
+/// Clarabel's settings: quiet, single-threaded, and with a fixed pattern. The subproblem's units (J/kg,
+/// m/s², g) are near one already: equilibration costs a fifth more iterations. Refinement of each
+/// linear solve takes half of the time and changes nothing down to its default tolerance.
 fn settings(tolerance: f64) -> DefaultSettings<f64> {
     DefaultSettings {
         tol_gap_abs: tolerance,
@@ -236,14 +26,89 @@ fn settings(tolerance: f64) -> DefaultSettings<f64> {
         max_iter: 60,
         presolve_enable: false,
         max_threads: 1,
-        iterative_refinement_reltol: 1e-9,
-        iterative_refinement_abstol: 1e-10,
-        iterative_refinement_max_iter: 3,
+        equilibrate_enable: false,
+        iterative_refinement_enable: tolerance < TOLERANCE,
         ..DefaultSettings::default()
     }
 }
 
-/// Solves the subproblem with Clarabel at its own tolerance (1e-8).
+/// Tolerance of gap and feasibility.
+const TOLERANCE: f64 = 1e-8;
+
+/// Clarabel with the workspace of its last solve: a subproblem of the same pattern keeps ordering
+/// and symbolic factorisation.
+#[derive(Default)]
+pub struct Clarabel {
+    last: Option<Workspace>,
+}
+
+struct Workspace {
+    equalities: usize,
+    solver: DefaultSolver<f64>,
+}
+
+impl Clone for Clarabel {
+    /// Without the workspace, which solutions do not depend on.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl core::fmt::Debug for Clarabel {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Clarabel").field("warm", &self.last.is_some()).finish()
+    }
+}
+
+impl Clarabel {
+    /// Solves the subproblem at Clarabel's own tolerance (1e-8).
+    #[must_use]
+    pub fn solve(
+        &mut self,
+        sub: &Subproblem,
+        terminal: Terminal,
+        time: TimeRule,
+        fence_s: Option<&[f64]>,
+    ) -> Solution {
+        self.solve_to(sub, terminal, time, fence_s, TOLERANCE)
+    }
+
+    fn solve_to(
+        &mut self,
+        sub: &Subproblem,
+        terminal: Terminal,
+        time: TimeRule,
+        fence_s: Option<&[f64]>,
+        tolerance: f64,
+    ) -> Solution {
+        let (m, rows) = Programme::build(sub, terminal, time, fence_s);
+        let p = CscMatrix::new_from_triplets(m.columns, m.columns, m.p.0, m.p.1, m.p.2);
+        let a = CscMatrix::new_from_triplets(m.b.len(), m.columns, m.a.0, m.a.1, m.a.2);
+        let kept = self.last.take().and_then(|mut last| {
+            let same = last.equalities == m.equalities
+                && last.solver.update_data(&p, &m.q, &a, &m.b).is_ok();
+            same.then_some(last)
+        });
+        let made = || {
+            let mut cones: Vec<SupportedConeT<f64>> = Vec::with_capacity(2);
+            if m.equalities > 0 {
+                cones.push(ZeroConeT(m.equalities));
+            }
+            cones.push(NonnegativeConeT(m.b.len() - m.equalities));
+            let solver = DefaultSolver::new(&p, &m.q, &a, &m.b, &cones, settings(tolerance));
+            solver.ok().map(|solver| Workspace { equalities: m.equalities, solver })
+        };
+        let Some(mut now) = kept.or_else(made) else {
+            return Solution::default();
+        };
+        now.solver.solve();
+        let found = read(&now.solver, sub, time, &rows);
+        self.last = Some(now);
+        found
+    }
+}
+
+/// Solves the subproblem with a new Clarabel at its own tolerance (1e-8).
 #[must_use]
 pub fn solve(
     sub: &Subproblem,
@@ -251,10 +116,10 @@ pub fn solve(
     time: TimeRule,
     fence_s: Option<&[f64]>,
 ) -> Solution {
-    solve_to(sub, terminal, time, fence_s, 1e-8)
+    Clarabel::default().solve(sub, terminal, time, fence_s)
 }
 
-/// Solves the subproblem with Clarabel to a given tolerance of gap and feasibility.
+/// Solves the subproblem with a new Clarabel to a given tolerance of gap and feasibility.
 #[must_use]
 pub fn solve_to(
     sub: &Subproblem,
@@ -263,19 +128,12 @@ pub fn solve_to(
     fence_s: Option<&[f64]>,
     tolerance: f64,
 ) -> Solution {
+    Clarabel::default().solve_to(sub, terminal, time, fence_s, tolerance)
+}
+
+/// The solution in the planner's terms.
+fn read(solver: &DefaultSolver<f64>, sub: &Subproblem, time: TimeRule, rows: &Rows) -> Solution {
     let n = sub.n;
-    let (m, rows) = Programme::build(sub, terminal, time, fence_s);
-    let p = CscMatrix::new_from_triplets(m.columns, m.columns, m.p.0, m.p.1, m.p.2);
-    let a = CscMatrix::new_from_triplets(m.b.len(), m.columns, m.a.0, m.a.1, m.a.2);
-    let mut cones: Vec<SupportedConeT<f64>> = Vec::with_capacity(2);
-    if m.equalities > 0 {
-        cones.push(ZeroConeT(m.equalities));
-    }
-    cones.push(NonnegativeConeT(m.b.len() - m.equalities));
-    let Ok(mut solver) = DefaultSolver::new(&p, &m.q, &a, &m.b, &cones, settings(tolerance)) else {
-        return Solution::default();
-    };
-    solver.solve();
     let s = &solver.solution;
     let status = match s.status {
         SolverStatus::Solved => SolveStatus::Solved,

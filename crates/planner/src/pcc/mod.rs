@@ -15,7 +15,7 @@
 //! | [`drive`] | the truth: driving a profile through the nonlinear truck |
 //! | [`cruise`] | conventional cruise control, the baselines |
 //! | [`lin`], [`quadratic`] | the convex subproblem |
-//! | [`clarabel_backend`] | its solution by Clarabel |
+//! | [`programme`], [`clarabel_backend`] | its solution by Clarabel |
 //! | [`structured`] | its solution by a banded interior-point method, without a library |
 //! | [`solver`] | which of the two a subproblem goes to |
 //! | [`search`] | joint search over speed and gear on a grid |
@@ -44,6 +44,8 @@ pub mod horizon_fence;
 mod horizon_setting;
 pub mod horizon_time;
 pub mod lin;
+#[cfg(feature = "solver")]
+pub mod programme;
 pub mod quadratic;
 pub mod search;
 pub mod solution;

@@ -1,5 +1,7 @@
 //! Which solver a subproblem goes to.
 
+#[cfg(feature = "solver")]
+use super::clarabel_backend::Clarabel;
 use super::lin::{Subproblem, Terminal, TimeRule};
 use super::solution::{Solution, SolveStatus};
 use super::structured::Structured;
@@ -9,6 +11,8 @@ use super::structured::Structured;
 #[derive(Debug, Clone, Default)]
 pub struct DefaultSolver {
     fast: Structured,
+    #[cfg(feature = "solver")]
+    clarabel: Clarabel,
 }
 
 impl DefaultSolver {
@@ -26,30 +30,32 @@ impl DefaultSolver {
             self.fast.solve_into(sub, terminal, time, &mut found);
         }
         if found.status != SolveStatus::Solved {
-            return second_opinion(sub, terminal, time, fence_s, found);
+            return self.second_opinion(sub, terminal, time, fence_s, found);
         }
         found
     }
-}
 
-#[cfg(feature = "solver")]
-fn second_opinion(
-    sub: &Subproblem,
-    terminal: Terminal,
-    time: TimeRule,
-    fence_s: Option<&[f64]>,
-    _fast: Solution,
-) -> Solution {
-    super::clarabel_backend::solve(sub, terminal, time, fence_s)
-}
+    #[cfg(feature = "solver")]
+    fn second_opinion(
+        &mut self,
+        sub: &Subproblem,
+        terminal: Terminal,
+        time: TimeRule,
+        fence_s: Option<&[f64]>,
+        _fast: Solution,
+    ) -> Solution {
+        self.clarabel.solve(sub, terminal, time, fence_s)
+    }
 
-#[cfg(not(feature = "solver"))]
-fn second_opinion(
-    _sub: &Subproblem,
-    _terminal: Terminal,
-    _time: TimeRule,
-    _fence_s: Option<&[f64]>,
-    fast: Solution,
-) -> Solution {
-    fast
+    #[cfg(not(feature = "solver"))]
+    fn second_opinion(
+        &mut self,
+        _sub: &Subproblem,
+        _terminal: Terminal,
+        _time: TimeRule,
+        _fence_s: Option<&[f64]>,
+        fast: Solution,
+    ) -> Solution {
+        fast
+    }
 }
