@@ -1,16 +1,20 @@
 """Cost of TraCI from Rust against SUMO's own step, Python libsumo and the native engine, in one run.
 
-Usage: python tools/sumo_bench.py TRACI_COST_BINARY [ROUNDS]
+Usage: python tools/sumo_bench.py TRACI_COST_BINARY [ROUNDS] [--one-core] [--realtime]
 The binary is the example `traci_cost` of the crate traffic-client. Needs `eclipse-sumo` and `libsumo`
-in this Python. Rust and libsumo rounds alternate; the table shows the least time per step of each
-case (the machine may be shared) and ratios to SUMO's own step.
+in this Python. In each round every case is driven once, in random order; the table shows the least
+wall time per step of each case (the machine may be shared), ratios, and the least processor time.
+--one-core keeps every case (SUMO, client, libsumo) on one core, so that no message has to wake
+another core; --realtime (root) lets the cases run before other programs.
 """
 
+import argparse
 import itertools
 import json
 import math
 import multiprocessing as mp
 import os
+import random
 import subprocess
 import sys
 import tempfile
@@ -25,7 +29,7 @@ Pose = tuple[float, float, float]
 
 
 def libsumo_round(
-    folder: str, full: bool, shape: list[Pose], queue: "Queue[float]"
+    folder: str, full: bool, shape: list[Pose], queue: "Queue[dict[str, float]]"
 ) -> None:
     import libsumo
 
@@ -43,13 +47,18 @@ def libsumo_round(
         libsumo.vehicle.subscribeContext("ego", 0xA4, 200, VARIABLES)
     for k in range(1, WARM_UP + STEPS + 1):
         if k == WARM_UP + 1:
-            started = time.perf_counter()
+            started, before = time.perf_counter(), time.process_time()
         if full:
             libsumo.vehicle.moveToXY("ego", "", -1, *shape[k], 2, 100)
         libsumo.simulationStep()
         if full:
-            libsumo.vehicle.getContextSubscriptionResults("ego")
-    queue.put((time.perf_counter() - started) * 1e6 / STEPS)
+            around = libsumo.vehicle.getContextSubscriptionResults("ego")
+            # The values are read, as the Rust client reads them.
+            seen = [[values[v] for v in VARIABLES] for values in around.values()]
+            if not seen:
+                raise ValueError("the ego sees not even itself")
+    wall, cpu = time.perf_counter() - started, time.process_time() - before
+    queue.put({"wall": wall * 1e6 / STEPS, "sumo_cpu": cpu * 1e6 / STEPS})
     libsumo.close()
 
 
@@ -86,53 +95,76 @@ def ego_path(folder: str) -> list[Pose]:
     return path
 
 
+def rust_round(binary: str, folder: str, vehicles: int, case: str) -> dict[str, float]:
+    out = subprocess.run(
+        [binary, folder, str(vehicles), case],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    result: dict[str, float] = json.loads(out.stdout or "{}")
+    return result
+
+
+def drive(
+    binary: str, folder: str, vehicles: int, case: str, path: list[Pose]
+) -> dict[str, float]:
+    if not case.startswith("libsumo"):
+        return rust_round(binary, folder, vehicles, case)
+    queue: Queue[dict[str, float]] = mp.Queue()
+    arguments = (folder, case == "libsumo full", path, queue)
+    worker = mp.Process(target=libsumo_round, args=arguments)
+    worker.start()
+    result = queue.get(timeout=120)
+    worker.join()
+    return result
+
+
 def main() -> None:
-    binary = sys.argv[1]
-    rounds = int(sys.argv[2]) if len(sys.argv) > 2 else 5
+    parser = argparse.ArgumentParser()
+    parser.add_argument("binary")
+    parser.add_argument("rounds", type=int, nargs="?", default=5)
+    parser.add_argument("--one-core", action="store_true")
+    parser.add_argument("--realtime", action="store_true")
+    parser.add_argument("--vehicles", type=int, nargs="*", default=[50, 200, 1000])
+    given = parser.parse_args()
+    if given.one_core:
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    if given.realtime:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     import sumo
 
-    sumo_binary = os.path.join(sumo.SUMO_HOME, "bin", "sumo")
-    environment = dict(os.environ, SUMO_BINARY=sumo_binary)
     os.environ["SUMO_HOME"] = sumo.SUMO_HOME
+    os.environ["SUMO_BINARY"] = os.path.join(sumo.SUMO_HOME, "bin", "sumo")
     print(
         "| vehicles | SUMO alone | step | + context | + moved ego | ratio "
-        "| libsumo step | libsumo full | Rust / libsumo | native | SUMO / native |"
+        "| libsumo step | libsumo full | Rust / libsumo | native | SUMO / native "
+        "| processor: alone | full: SUMO | full: client | libsumo full |"
     )
-    print("|---|---|---|---|---|---|---|---|---|---|---|")
-    for vehicles in (50, 200, 1000):
-        best: dict[str, float] = {}
+    print("|---" * 15 + "|")
+    cases = ["floor", "step", "context", "full", "native", "libsumo step", "libsumo full"]
+    for vehicles in given.vehicles:
+        best: dict[tuple[str, str], float] = {}
         with tempfile.TemporaryDirectory() as folder:
-            for _ in range(rounds):
-                out = subprocess.run(
-                    [binary, folder, str(vehicles)],
-                    env=environment,
-                    check=True,
-                    capture_output=True,
-                    text=True,
-                )
-                result: dict[str, float] = json.loads(out.stdout)
-                path = ego_path(folder)
-                for name, full in (
-                    ("libsumo_step_us", False),
-                    ("libsumo_full_us", True),
-                ):
-                    queue: Queue[float] = mp.Queue()
-                    worker = mp.Process(
-                        target=libsumo_round, args=(folder, full, path, queue)
-                    )
-                    worker.start()
-                    result[name] = queue.get(timeout=120)
-                    worker.join()
-                for name, value in result.items():
-                    best[name] = min(best.get(name, value), value)
-        moved = best["ego_and_context_us"]
-        native = best["native_us"] * vehicles / max(best["native_vehicles"], 1)
+            rust_round(given.binary, folder, vehicles, "prepare")
+            path = ego_path(folder)
+            for _ in range(given.rounds):
+                for case in random.sample(cases, len(cases)):
+                    result = drive(given.binary, folder, vehicles, case, path)
+                    for name, value in result.items():
+                        key = (case, name)
+                        best[key] = min(best.get(key, value), value)
+        wall = {case: best[case, "wall"] for case in cases}
+        native = wall["native"] * vehicles / max(best["native", "vehicles"], 1)
         print(
-            f"| {vehicles} | {best['floor_us']:.0f} | {best['step_us']:.0f} "
-            f"| {best['context_us']:.0f} | {moved:.0f} | {moved / best['floor_us']:.2f} "
-            f"| {best['libsumo_step_us']:.0f} | {best['libsumo_full_us']:.0f} "
-            f"| {moved / best['libsumo_full_us']:.2f} | {native:.1f} "
-            f"| {best['floor_us'] / native:.0f} |",
+            f"| {vehicles} | {wall['floor']:.0f} | {wall['step']:.0f} "
+            f"| {wall['context']:.0f} | {wall['full']:.0f} "
+            f"| {wall['full'] / wall['floor']:.2f} "
+            f"| {wall['libsumo step']:.0f} | {wall['libsumo full']:.0f} "
+            f"| {wall['full'] / wall['libsumo full']:.2f} | {native:.1f} "
+            f"| {wall['floor'] / native:.0f} | {best['floor', 'sumo_cpu']:.0f} "
+            f"| {best['full', 'sumo_cpu']:.0f} | {best['full', 'client_cpu']:.0f} "
+            f"| {best['libsumo full', 'sumo_cpu']:.0f} |",
             flush=True,
         )
 

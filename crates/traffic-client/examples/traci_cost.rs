@@ -1,9 +1,11 @@
-//! One round of the TraCI cost measurement: µs per step of 0.1 s, as one JSON line.
+//! One measurement of the cost of TraCI: µs per step of 0.1 s, as one JSON line.
 //!
-//! `traci_cost FOLDER VEHICLES` builds the network of the built-in highway and a demand of that many
-//! vehicles into FOLDER (which exists), and times: SUMO alone (one long step), a step per message,
-//! plus context subscription, plus the moved ego, and the native engine with as many vehicles.
-//! `tools/sumo_bench.py` calls it in turn with libsumo and prints the table.
+//! `traci_cost FOLDER VEHICLES prepare` builds the network of the built-in highway and a demand of
+//! that many vehicles into FOLDER (which exists). `traci_cost FOLDER VEHICLES CASE` drives it once:
+//! `floor` is SUMO alone (one long step), `step` a step per message, `context` that and a context
+//! subscription, `full` that and the moved ego; `native` is the native engine with as many vehicles.
+//! Beside the wall time, each gives the processor time of SUMO and of this client (Linux).
+//! `tools/sumo_bench.py` calls the cases in random order with libsumo and prints the table.
 #![allow(clippy::disallowed_methods, clippy::disallowed_macros, reason = "a measurement program")]
 
 use std::error::Error;
@@ -22,54 +24,49 @@ use traffic_client::sumo::{Link, Programs, Timeouts};
 
 const WARM_UP: usize = 100;
 const STEPS: usize = 300;
+/// The same for every case, in `tools/sumo_bench.py` too.
+const OPTIONS: &str = "--step-length 0.1 --seed 1 --thread-rngs 64 --no-step-log \
+     --duration-log.disable --no-warnings --xml-validation never --time-to-teleport -1 \
+     --collision.action none --lanechange.duration 3";
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let (Some(folder), Some(vehicles)) = (arguments.next(), arguments.next()) else {
-        return Err("usage: traci_cost FOLDER VEHICLES".into());
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [folder, vehicles, case] = arguments.as_slice() else {
+        return Err(
+            "usage: traci_cost FOLDER VEHICLES prepare|floor|step|context|full|native".into()
+        );
     };
-    let (folder, vehicles) = (Path::new(&folder), vehicles.parse::<usize>()?);
-    let programs = Programs::find(None)?;
+    let (folder, vehicles) = (Path::new(folder), vehicles.parse::<usize>()?);
     let road = Arc::new(builtin::highway());
-    let network = convert(&programs, &road, folder, &[])?;
-    let routes = folder.join("bench.rou.xml");
-    std::fs::write(&routes, demand(&network, vehicles))?;
-    let options: Vec<String> = [
-        "-n",
-        &network.file.display().to_string(),
-        "-r",
-        &routes.display().to_string(),
-        "--step-length",
-        "0.1",
-        "--seed",
-        "1",
-        "--thread-rngs",
-        "64",
-        "--no-step-log",
-        "--duration-log.disable",
-        "--no-warnings",
-        "--xml-validation",
-        "never",
-        "--time-to-teleport",
-        "-1",
-        "--collision.action",
-        "none",
-        "--lanechange.duration",
-        "3",
-    ]
-    .map(str::to_owned)
-    .to_vec();
-    let floor = sumo(&programs, &options, &road, Case::Floor)?;
-    let step = sumo(&programs, &options, &road, Case::Step)?;
-    let context = sumo(&programs, &options, &road, Case::Context)?;
-    let full = sumo(&programs, &options, &road, Case::Full)?;
-    let (native, native_vehicles) = native(&road, vehicles)?;
-    println!(
-        "{{\"vehicles\": {vehicles}, \"floor_us\": {floor:.1}, \"step_us\": {step:.1}, \
-         \"context_us\": {context:.1}, \"ego_and_context_us\": {full:.1}, \
-         \"native_us\": {native:.2}, \"native_vehicles\": {native_vehicles}}}"
-    );
+    let (net, routes) = (folder.join("road.net.xml"), folder.join("bench.rou.xml"));
+    let case = match case.as_str() {
+        "prepare" => {
+            let network = convert(&Programs::find(None)?, &road, folder, &[])?;
+            return Ok(std::fs::write(&routes, demand(&network, vehicles))?);
+        }
+        "native" => {
+            let (wall_us, vehicles) = native(&road, vehicles)?;
+            println!("{{\"wall\": {wall_us:.3}, \"vehicles\": {vehicles}}}");
+            return Ok(());
+        }
+        "floor" => Case::Floor,
+        "step" => Case::Step,
+        "context" => Case::Context,
+        "full" => Case::Full,
+        other => return Err(format!("no case {other}").into()),
+    };
+    let mut options = vec!["-n".to_owned(), net.display().to_string()];
+    options.extend(["-r".to_owned(), routes.display().to_string()]);
+    options.extend(OPTIONS.split_whitespace().map(str::to_owned));
+    let [wall, sumo, client] = sumo(&options, &road, case)?;
+    println!("{{\"wall\": {wall:.2}, \"sumo_cpu\": {sumo:.2}, \"client_cpu\": {client:.2}}}");
     Ok(())
+}
+
+/// Processor time that the first thread of a process has had, µs; 0 where the system does not say.
+fn cpu_us(pid: &str) -> f64 {
+    let text = std::fs::read_to_string(format!("/proc/{pid}/schedstat")).unwrap_or_default();
+    text.split_whitespace().next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-3
 }
 
 /// As many vehicles, evenly over the through route, half of them in each lane.
@@ -116,13 +113,11 @@ enum Case {
     Full,
 }
 
-fn sumo(
-    programs: &Programs,
-    options: &[String],
-    road: &Road,
-    case: Case,
-) -> Result<f64, Box<dyn Error>> {
-    let mut link = Link::start(programs, options, Timeouts::default())?;
+/// Wall time, and processor time of SUMO and of this program, per step, µs.
+fn sumo(options: &[String], road: &Road, case: Case) -> Result<[f64; 3], Box<dyn Error>> {
+    let mut link = Link::start(&Programs::find(None)?, options, Timeouts::default())?;
+    let pid = link.pid().unwrap_or_default().to_string();
+    let cpu = || [cpu_us(&pid), cpu_us("self")];
     let place = |link: &mut Link, k: usize| {
         let s_m = 3000.0 + 2.0 * k as f64;
         let at = road.at(s_m, road.lanes().first().map_or(0.0, |lane| lane.center_d_m(s_m)));
@@ -142,17 +137,17 @@ fn sumo(
         link.session.request().subscribe_context(id::VEHICLE, "ego", 200.0);
         link.command("subscribe", "ego")?;
     }
-    let mut started = Instant::now();
+    let (mut started, mut before) = (Instant::now(), cpu());
     if case == Case::Floor {
         link.session.request().step_to(0.1 * WARM_UP as f64);
         link.exchange("warm up")?;
-        started = Instant::now();
+        (started, before) = (Instant::now(), cpu());
         link.session.request().step_to(0.1 * (WARM_UP + STEPS) as f64);
         link.exchange("floor")?;
     } else {
         for k in 1..=WARM_UP + STEPS {
             if k == WARM_UP + 1 {
-                started = Instant::now();
+                (started, before) = (Instant::now(), cpu());
             }
             link.session.request();
             if case == Case::Full {
@@ -162,7 +157,8 @@ fn sumo(
             link.exchange("step")?;
         }
     }
-    Ok(started.elapsed().as_secs_f64() * 1e6 / STEPS as f64)
+    let (wall_us, after) = (started.elapsed().as_secs_f64() * 1e6, cpu());
+    Ok([wall_us, after[0] - before[0], after[1] - before[1]].map(|us| us / STEPS as f64))
 }
 
 fn native(road: &Arc<Road>, vehicles: usize) -> Result<(f64, usize), Box<dyn Error>> {

@@ -14,6 +14,8 @@ pub struct Connection {
     frames: Frames,
     body: Vec<u8>,
     chunk: Vec<u8>,
+    /// Timeout that the socket has now; not set again for each exchange.
+    timeout: Option<Duration>,
 }
 
 /// Why no answer came; the caller knows what to say about the process.
@@ -54,6 +56,7 @@ impl Connection {
                     frames: Frames::default(),
                     body: Vec::new(),
                     chunk: vec![0; 1 << 16],
+                    timeout: None,
                 });
             }
             if !is_alive() {
@@ -72,17 +75,19 @@ impl Connection {
     /// [`LinkError`]; the connection is unusable afterwards.
     pub fn exchange(&mut self, message: &[u8], timeout: Duration) -> Result<&[u8], LinkError> {
         let deadline = now() + timeout;
-        self.stream.set_write_timeout(Some(timeout)).map_err(|_| LinkError::Closed)?;
+        self.wait_at_most(timeout)?;
         self.stream.write_all(message).map_err(|e| link(&e))?;
         loop {
             if self.frames.take(&mut self.body).map_err(LinkError::Protocol)? {
                 return Ok(&self.body);
             }
-            let left = deadline.saturating_duration_since(now());
-            if left.is_zero() {
-                return Err(LinkError::TimedOut);
+            if self.frames.is_partial() {
+                let left = deadline.saturating_duration_since(now());
+                if left.is_zero() {
+                    return Err(LinkError::TimedOut);
+                }
+                self.wait_at_most(left)?;
             }
-            self.stream.set_read_timeout(Some(left)).map_err(|_| LinkError::Closed)?;
             match self.stream.read(&mut self.chunk) {
                 Ok(0) => return Err(LinkError::Closed),
                 Ok(n) => self.frames.push(self.chunk.get(..n).unwrap_or_default()),
@@ -90,6 +95,16 @@ impl Connection {
                 Err(e) => return Err(link(&e)),
             }
         }
+    }
+
+    fn wait_at_most(&mut self, timeout: Duration) -> Result<(), LinkError> {
+        if self.timeout != Some(timeout) {
+            self.timeout = None;
+            self.stream.set_write_timeout(Some(timeout)).map_err(|_| LinkError::Closed)?;
+            self.stream.set_read_timeout(Some(timeout)).map_err(|_| LinkError::Closed)?;
+            self.timeout = Some(timeout);
+        }
+        Ok(())
     }
 }
 
