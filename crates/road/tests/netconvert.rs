@@ -8,15 +8,17 @@ use std::process::Command;
 
 use road::{LaneKind, Road, builtin};
 
-const OPTIONS: [&str; 7] = [
+const OPTIONS: [&str; 6] = [
     "--opendrive.curve-resolution=2",
     "--offset.disable-normalization",
     "--output.original-names",
     "--precision=6",
     "--no-turnarounds",
-    "--junctions.endpoint-shape",
     "--opendrive.internal-shapes",
 ];
+
+/// SUMO 1.15 lacks it, 1.28 has it: lanes end where the map says, and not where netconvert's junctions begin.
+const ENDPOINT_SHAPE: &str = "--junctions.endpoint-shape";
 
 /// Shapes of the lanes of the network file: points x, y, z.
 fn lanes(net: &str) -> Vec<Vec<[f64; 3]>> {
@@ -54,23 +56,27 @@ fn compare(road: &Road) -> Option<(f64, f64, usize)> {
     std::fs::create_dir_all(&folder).unwrap();
     let (map, net) = (folder.join("map.xodr"), folder.join("map.net.xml"));
     std::fs::write(&map, road.write_opendrive()).unwrap();
-    let run = Command::new(netconvert())
+    let Ok(help) = Command::new(netconvert()).arg("--help").output() else {
+        println!("skipped: netconvert is neither beside SUMO_BINARY nor on the path");
+        return None;
+    };
+    let knows_it = String::from_utf8_lossy(&help.stdout).contains(ENDPOINT_SHAPE);
+    let output = Command::new(netconvert())
         .arg("--opendrive-files")
         .arg(&map)
         .arg("-o")
         .arg(&net)
         .args(OPTIONS)
-        .output();
-    let Ok(output) = run else {
-        println!("skipped: netconvert is neither beside SUMO_BINARY nor on the path");
-        return None;
-    };
+        .args(knows_it.then_some(ENDPOINT_SHAPE))
+        .output()
+        .unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
-    if said.contains("No option with the name") {
-        println!("skipped: this netconvert is too old: {}", said.trim());
+    if said.contains("could not be loaded from 'built in type map'") {
+        std::fs::remove_dir_all(&folder).unwrap();
+        println!("skipped: SUMO's data (its type maps) are not installed: {}", said.trim());
         return None;
     }
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{said}");
     let lanes = lanes(&std::fs::read_to_string(&net).unwrap());
     std::fs::remove_dir_all(&folder).unwrap();
     let (mut across, mut height) = (0.0_f64, 0.0_f64);

@@ -11,6 +11,7 @@ pub mod native;
 mod perception;
 mod philox;
 pub mod replay;
+mod search;
 pub mod stats;
 pub mod sumo;
 

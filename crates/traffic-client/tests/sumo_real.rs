@@ -53,7 +53,15 @@ fn truck() -> Geometry {
 }
 
 fn flat_traffic(folder: &Folder, traffic: TrafficConfig) -> (Arc<Road>, SumoTraffic) {
-    let road = Arc::new(builtin::flat(4000.0));
+    traffic_over(4000.0, folder, traffic)
+}
+
+fn traffic_over(
+    length_m: f64,
+    folder: &Folder,
+    traffic: TrafficConfig,
+) -> (Arc<Road>, SumoTraffic) {
+    let road = Arc::new(builtin::flat(length_m));
     let config = SumoConfig { traffic, ..SumoConfig::default() };
     let sumo = SumoTraffic::new(road.clone(), truck(), config, &folder.0).unwrap();
     (road, sumo)
@@ -120,22 +128,35 @@ fn sumo_traffic_drives_around_the_ego_on_our_road() {
     assert!(sumo.version().unwrap().0.contains("SUMO"));
 }
 
+/// A run of so many steps, again after a reset, with another seed, and in a new process.
+fn check_exactness(name: &str, steps: i64) {
+    let folder = Folder::new(name);
+    let length_m = 3000.0 + 1.5 * steps as f64;
+    let config = TrafficConfig::family(Density::Dense, 15.0, 5);
+    let (road, mut first) = traffic_over(length_m, &folder, config.clone());
+    let once = drive(&mut first, &road, steps, |_, _| {});
+    first.reset(5).unwrap();
+    assert_eq!(drive(&mut first, &road, steps, |_, _| {}), once, "after a reset");
+    first.reset(6).unwrap();
+    assert_ne!(drive(&mut first, &road, steps, |_, _| {}), once, "with another seed");
+    let other = Folder::new(&format!("{name}-fresh"));
+    let (_, mut fresh) = traffic_over(length_m, &other, config);
+    assert_eq!(drive(&mut fresh, &road, steps, |_, _| {}), once, "in a new process");
+}
+
 #[test]
 fn sumo_is_bit_exact_for_a_seed_and_a_reset_equals_a_fresh_start() {
-    if !sumo_is_here() {
-        return;
+    if sumo_is_here() {
+        check_exactness("exact", 400);
     }
-    let folder = Folder::new("exact");
-    let config = TrafficConfig::family(Density::Dense, 15.0, 5);
-    let (road, mut first) = flat_traffic(&folder, config.clone());
-    let once = drive(&mut first, &road, 400, |_, _| {});
-    first.reset(5).unwrap();
-    assert_eq!(drive(&mut first, &road, 400, |_, _| {}), once, "after a reset");
-    first.reset(6).unwrap();
-    assert_ne!(drive(&mut first, &road, 400, |_, _| {}), once, "with another seed");
-    let other = Folder::new("exact2");
-    let (_, mut fresh) = flat_traffic(&other, config);
-    assert_eq!(drive(&mut fresh, &road, 400, |_, _| {}), once, "in a new process");
+}
+
+#[test]
+#[ignore = "campaign: ten minutes of traffic, four times; see docs/results/traffic.md"]
+fn sumo_is_bit_exact_and_a_reset_equals_a_fresh_start_over_ten_minutes() {
+    if sumo_is_here() {
+        check_exactness("exact-long", 6000);
+    }
 }
 
 #[test]

@@ -9,10 +9,10 @@ use road::Road;
 use sim::{Scenario, Traffic, TrafficKind};
 use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
 use traffic_client::Mode;
-use traffic_client::calibrate::{Effort, calibrate};
-use traffic_client::native::TrafficConfig;
+use traffic_client::calibrate::{Effort, Lesson, calibrate, drive_bounded};
+use traffic_client::native::{Boundary, TrafficConfig};
 use traffic_client::replay::{Frame, Recording, Row, write_parquet};
-use traffic_client::stats::Observer;
+use traffic_client::stats::{Observer, Samples};
 
 use crate::cli::positive;
 use crate::cmd::run::options::{TrafficChanges, load, seed};
@@ -120,13 +120,31 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         diagram::draw(&scenario, seed, &args.out)?;
     }
     let driven = drive(args, &scenario, seed)?;
-    let report = Report::new(&scenario, seed, &driven, &measured, &args.calibrate);
+    let bounded = bounded(&scenario, seed, &measured)?;
+    let report = Report::new(&scenario, seed, &driven, &measured, &bounded, &args.calibrate);
     let json = serde_json::to_string_pretty(&report).map_err(Failure::work)?;
     write(&args.out.join("statistics.json"), &json)?;
     let picture = plots::page(&report.sentence(), &driven.samples, &measured);
     write(&args.out.join("statistics.html"), &picture)?;
     output::result(if args.json { json } else { report.sentence() }.as_str());
     Ok(())
+}
+
+/// Drives of bounded traffic per recording.
+const BOUNDED_DRIVES: u64 = 4;
+
+/// The scenario's drivers between the measured start, arrivals and end of each recording.
+fn bounded(scenario: &Scenario, seed: u64, measured: &Measured) -> Result<Vec<Samples>, Failure> {
+    if scenario.traffic.source != TrafficKind::Native {
+        return Ok(Vec::new());
+    }
+    let config = scenario.traffic.demand(seed);
+    let drive = |recording, road| {
+        let boundary = Arc::new(Boundary::of(road, recording)?);
+        drive_bounded(road, &config, &boundary, BOUNDED_DRIVES)
+    };
+    let pairs = measured.recordings.iter().zip(&measured.roads);
+    pairs.map(|(recording, road)| drive(recording, road).map_err(Failure::input)).collect()
 }
 
 /// Traffic that was driven and looked at.
@@ -211,8 +229,14 @@ fn calibrated(
     output::note("calibrating ...");
     // Judged later with traffic that was not driven in the search.
     let base = scenario.traffic.demand(seed ^ SEARCH_SEED);
-    let found = calibrate(road, &learned.recordings, &learned.samples, &base, effort)
-        .map_err(Failure::input)?;
+    let lessons: Vec<Lesson<'_>> = learned
+        .recordings
+        .iter()
+        .zip(&learned.roads)
+        .zip(&learned.each)
+        .map(|((recording, road), samples)| Lesson { recording, road, samples })
+        .collect();
+    let found = calibrate(&lessons, &base, effort).map_err(Failure::input)?;
     let mut scenario = scenario;
     scenario.name = format!("{}-calibrated", scenario.name);
     scenario.description = format!(

@@ -20,6 +20,8 @@ pub(crate) struct Driver {
     pub(crate) politeness_frac: f64,
     /// Off-ramp that the vehicle takes, or [`NO_LANE`].
     pub(crate) exit: u16,
+    /// Station at which the vehicle leaves the road where no ramp is, m (measured traffic).
+    pub(crate) leaves_s_m: f64,
     pub(crate) class: VehicleClass,
 }
 
@@ -74,6 +76,7 @@ impl Driver {
             power_w_kg: about(c.power_w_kg, 7),
             politeness_frac: c.politeness_frac,
             exit,
+            leaves_s_m: f64::INFINITY,
             class,
         }
     }

@@ -7,6 +7,7 @@
 
 use std::sync::Arc;
 
+use super::boundary::Boundary;
 use super::config::{ClassConfig, TrafficConfig};
 use super::ego::EgoSpans;
 use super::fleet::Fleet;
@@ -31,7 +32,7 @@ const APART_M: f64 = 150.0;
 const END_MARGIN_M: f64 = 2.0;
 
 /// Drivers adapt to the speed beyond the end of the road over this stretch before it, m.
-const BEYOND_M: f64 = 60.0;
+pub(crate) const BEYOND_M: f64 = 60.0;
 
 /// Everything that changes: what a snapshot holds.
 #[derive(Debug, Default, PartialEq)]
@@ -43,6 +44,9 @@ pub(crate) struct State {
     pub(crate) next_id: u64,
     /// Arrivals that found no room yet, per lane.
     pub(crate) waiting: Vec<u32>,
+    /// Next arrival of a measured boundary, and those that wait for room.
+    pub(crate) next_arrival: usize,
+    pub(crate) late: Vec<usize>,
     /// Distance driven by all vehicles together, m.
     pub(crate) driven_m: f64,
     /// Lane changes begun.
@@ -61,6 +65,8 @@ impl Clone for State {
         self.tick = from.tick;
         self.next_id = from.next_id;
         self.waiting.clone_from(&from.waiting);
+        self.next_arrival = from.next_arrival;
+        self.late.clone_from(&from.late);
         self.driven_m = from.driven_m;
         self.lane_changes = from.lane_changes;
     }
@@ -80,6 +86,8 @@ pub(crate) struct Engine {
     begun_m: Vec<f64>,
     /// Speed beyond the end of the road per lane, m/s; empty where the road goes on free.
     beyond_m_s: Vec<f64>,
+    /// Measured traffic at the rim, in place of drawn arrivals.
+    pub(crate) boundary: Option<Arc<Boundary>>,
     /// How other drivers expect the ego to follow.
     ego_driver: Idm,
 }
@@ -108,6 +116,7 @@ impl Engine {
             raw_a_m_s2: Vec::new(),
             begun_m: Vec::new(),
             beyond_m_s: Vec::new(),
+            boundary: None,
             ego_driver: Idm::new(25.0, 1.5, 3.0, 0.6, 1.5, 6.0),
         }
     }
@@ -166,6 +175,11 @@ impl Engine {
 
     /// The speed at which traffic moves beyond the end of the road at this tick, per lane.
     fn look_beyond(&mut self) {
+        if let Some(boundary) = &self.boundary {
+            self.beyond_m_s.clear();
+            self.beyond_m_s.extend_from_slice(boundary.beyond_m_s(self.state.tick));
+            return;
+        }
         let Some(mean_m_s) = self.config.outflow_speed_m_s else { return };
         let (sigma_m_s, seed) = (self.config.outflow_sigma_m_s, self.config.seed);
         let period = ((self.config.outflow_period_s / TICK_S) as u64).max(1);
@@ -390,10 +404,13 @@ impl Engine {
         fleet.sort();
         fleet.retain(|f, i| {
             let lane = &map.lanes[f.lane[i] as usize];
-            let left_road = f.rear_m(i) > map.s_end_m;
+            let left_road = f.rear_m(i) > map.s_end_m || f.s_m[i] > f.driver[i].leaves_s_m;
             !(left_road || lane.leaves && f.s_m[i] > lane.s_end_m)
         });
-        self.let_in();
+        match self.boundary.clone() {
+            Some(boundary) => self.let_in_measured(&boundary),
+            None => self.let_in(),
+        }
     }
 
     /// Smallest bumper-to-bumper gap to a leader in any lane that a vehicle takes up, m; call it

@@ -1,5 +1,6 @@
 //! Native traffic: IDM car following, MOBIL lane changes, inflow, ramps, grades, the ego seen by
 //! lateral overlap.
+mod boundary;
 mod config;
 mod driver;
 mod ego;
@@ -14,6 +15,7 @@ mod neighbours;
 mod publish;
 mod source;
 
+pub use boundary::Boundary;
 pub use config::{ClassConfig, Density, FAMILY_MAX_SPEEDS_M_S, TrafficConfig};
 pub(crate) use ego::EgoSpans;
 pub(crate) use from_road::lane_map;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use road::Road;
 use tractrix_core::{EgoState, Geometry, Scene, Time, TrafficSource};
 
+use super::boundary::Boundary;
 use super::config::TrafficConfig;
 use super::engine::{Engine, State, TICK_S};
 use super::publish::publish;
@@ -84,6 +85,22 @@ impl NativeTraffic {
         // The vehicles around the ego are those of the scene: nobody is taken away.
         traffic.tick_start = Some(scene.time);
         traffic.engine.decide();
+        Ok(traffic)
+    }
+
+    /// Traffic that begins with the vehicles of a measured boundary and gets its arrivals from it:
+    /// what happens on the road in between is the drivers' own. No warm-up.
+    ///
+    /// # Errors
+    /// As [`NativeTraffic::new`].
+    pub fn bounded(
+        road: Arc<Road>,
+        geometry: Geometry,
+        config: TrafficConfig,
+        boundary: Arc<Boundary>,
+    ) -> Result<Self, TrafficError> {
+        let mut traffic = Self::new(road, geometry, TrafficConfig { warm_up_s: 0.0, ..config })?;
+        traffic.engine.bound(boundary);
         Ok(traffic)
     }
 

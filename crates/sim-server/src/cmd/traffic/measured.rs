@@ -17,6 +17,8 @@ pub(super) struct Measured {
     pub(super) recordings: Vec<Recording>,
     pub(super) roads: Vec<Arc<Road>>,
     pub(super) each: Vec<Samples>,
+    /// Speeds of each recording if everyone kept the speed that they were seen at first, m/s.
+    pub(super) kept_m_s: Vec<Vec<f64>>,
     /// All samples together.
     pub(super) samples: Samples,
     /// Metres of lanes, mean of the recordings.
@@ -65,6 +67,9 @@ impl Measured {
             let mut samples = observe_recording(&road, &recording).map_err(Failure::input)?;
             // All speeds of the file, also those that our road could not take up.
             samples.replace(Quantity::Speed, recording.speeds_m_s().collect());
+            let kept = recording.tracks.iter().filter_map(|t| Some((t.samples.first()?, t)));
+            let kept = kept.flat_map(|(first, t)| t.samples.iter().map(|_| first.speed_m_s));
+            all.kept_m_s.push(kept.collect());
             all.lanes_m += traffic_client::calibrate::lanes_m(&road);
             if all.each.is_empty() {
                 all.samples = samples.clone();

@@ -7,7 +7,7 @@ use serde::Serialize;
 use sim::Scenario;
 use traffic_client::Mode;
 use traffic_client::stats::{
-    Moments, QUANTITIES, Samples, kolmogorov_smirnov, moments, wasserstein,
+    Moments, QUANTITIES, Quantity, Samples, kolmogorov_smirnov, moments, wasserstein,
 };
 
 use super::Driven;
@@ -32,6 +32,10 @@ pub(super) struct Report {
     /// Simulated against measured, by quantity.
     #[serde(skip_serializing_if = "Option::is_none")]
     distances: Option<Distances>,
+    /// The same drivers between the measured start, arrivals and end of each recording, all
+    /// recordings together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bounded: Option<Bounded>,
     /// The same for each recording.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     recordings: Vec<OneRecording>,
@@ -42,9 +46,20 @@ struct OneRecording {
     file: String,
     figures: Figures,
     distances: Distances,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    bounded: Option<Bounded>,
     /// This recording against all others together: what recordings differ by among themselves.
     #[serde(skip_serializing_if = "Option::is_none")]
     distances_to_other_recordings: Option<Distances>,
+}
+
+/// Traffic with the start and the arrivals of a recording.
+#[derive(Debug, Serialize)]
+struct Bounded {
+    distances: Distances,
+    lane_changes_per_vehicle_1_km: f64,
+    /// What remains if nobody reacts to anybody: everyone keeps the speed of their arrival.
+    ks_of_kept_speeds: f64,
 }
 
 /// Traffic in numbers.
@@ -97,12 +112,24 @@ fn distances(a: &Samples, b: &Samples) -> Distances {
     QUANTITIES.iter().filter_map(|&(q, key, _)| of(q, key)).collect()
 }
 
+impl Bounded {
+    fn new(bounded: &Samples, measured: &Samples, kept_m_s: &[f64]) -> Self {
+        let speeds = measured.of(Quantity::Speed);
+        Self {
+            distances: distances(bounded, measured),
+            lane_changes_per_vehicle_1_km: bounded.lane_changes_1_km(),
+            ks_of_kept_speeds: kolmogorov_smirnov(kept_m_s, speeds).unwrap_or(1.0),
+        }
+    }
+}
+
 impl Report {
     pub(super) fn new(
         scenario: &Scenario,
         seed: u64,
         driven: &Driven,
         measured: &Measured,
+        bounded: &[Samples],
         calibrated_to: &[PathBuf],
     ) -> Self {
         let there = !measured.each.is_empty();
@@ -115,10 +142,16 @@ impl Report {
                     file: f.display().to_string(),
                     figures: figures(s, measured.lanes_m),
                     distances: distances(&driven.samples, s),
+                    bounded: bounded.get(k).map(|b| Bounded::new(b, s, &measured.kept_m_s[k])),
                     distances_to_other_recordings: (measured.each.len() > 1)
                         .then(|| distances(s, &others)),
                 }
             });
+        let together = bounded.first().map(|first| {
+            let mut all = first.clone();
+            bounded.iter().skip(1).for_each(|b| all.append(b));
+            Bounded::new(&all, &measured.samples, &measured.kept_m_s.concat())
+        });
         Self {
             provenance: Provenance::of_seed(seed),
             scenario: scenario.name.clone(),
@@ -129,6 +162,7 @@ impl Report {
             simulated: figures(&driven.samples, driven.lanes_m),
             measured: there.then(|| figures(&measured.samples, measured.lanes_m)),
             distances: there.then(|| distances(&driven.samples, &measured.samples)),
+            bounded: together,
             recordings: recordings.collect(),
         }
     }
@@ -156,6 +190,12 @@ impl Report {
                 .map(|(key, d)| format!("{key} {:.3} ({:.2})", d.ks, d.wasserstein))
                 .collect();
             text.push_str("; KS (Wasserstein) to measured: ");
+            text.push_str(&all.join(", "));
+        }
+        if let Some(bounded) = &self.bounded {
+            let all: Vec<String> =
+                bounded.distances.iter().map(|(key, d)| format!("{key} {:.3}", d.ks)).collect();
+            text.push_str("; KS with the measured start and arrivals: ");
             text.push_str(&all.join(", "));
         }
         text

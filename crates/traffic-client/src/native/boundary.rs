@@ -1,0 +1,207 @@
+//! Measured traffic at the rim of a stretch: who is on it at the start, who comes when, who leaves
+//! where, and how fast the traffic beyond its end is.
+//!
+//! This is how microscopic models are validated (Treiber & Kesting 2013, ch. 16): the demand is the
+//! measured one, what the drivers do with it between start and end is the model's. Lanes are those
+//! of the road; stations are of front bumpers.
+
+use std::sync::Arc;
+
+use road::Road;
+use tractrix_core::{EgoState, Scene, Time, TrafficSource, VehicleClass};
+
+use super::driver::Driver;
+use super::engine::{BEYOND_M, Engine, TICK_S};
+use super::fleet::Fleet;
+use crate::TrafficError;
+use crate::replay::{Recording, ReplayConfig, ReplayTraffic};
+
+/// A vehicle that is last seen this far before the end of the road left it sideways, m.
+const SIDEWAYS_M: f64 = 30.0;
+/// Time over which the speed beyond the end is averaged, s.
+const MEAN_S: f64 = 3.0;
+
+/// A vehicle that comes, or is there at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Arrival {
+    tick: u64,
+    id: u64,
+    class: VehicleClass,
+    length_m: f64,
+    s_m: f64,
+    speed_m_s: f64,
+    lane: u16,
+    /// Station at which it leaves the road sideways, m; infinite: at the end.
+    leaves_s_m: f64,
+}
+
+/// Start, arrivals, departures and the speed beyond the end, from a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Boundary {
+    /// In order of their tick; tick 0 is the start.
+    arrivals: Vec<Arrival>,
+    /// Speed beyond the end by tick and lane, m/s; infinite where nobody was seen yet.
+    beyond_m_s: Vec<Vec<f64>>,
+}
+
+impl Boundary {
+    /// What a recording on a road says about the rim of it.
+    ///
+    /// # Errors
+    /// [`TrafficError`] if the recording does not lie on the road.
+    pub fn of(road: &Arc<Road>, recording: &Recording) -> Result<Self, TrafficError> {
+        let config = ReplayConfig { scene_radius_m: f64::INFINITY, ..ReplayConfig::default() };
+        let mut replay = ReplayTraffic::new(Arc::clone(road), recording, config)?;
+        let ego = EgoState { s_m: 0.5 * road.length_m(), ..EgoState::default() };
+        let (lanes, end_m) = (road.lanes().len(), road.length_m());
+        let mut arrivals: Vec<Arrival> = Vec::new();
+        let mut last_seen: Vec<(u64, f64)> = Vec::new();
+        let mut beyond_m_s: Vec<Vec<f64>> = Vec::new();
+        let mut held = vec![f64::INFINITY; lanes];
+        let ticks = (recording.duration_s() / TICK_S) as u64;
+        for tick in 0..ticks.saturating_sub(1) {
+            let now = Time::from_seconds(tick as f64 * TICK_S);
+            let scene: &Scene = replay.advance(now, &ego)?;
+            let mut near_end = vec![(0.0, 0.0); lanes];
+            for n in &scene.neighbours {
+                match arrivals.iter().position(|a| a.id == n.id) {
+                    Some(k) => last_seen[k] = (tick, n.front_s_m),
+                    None => {
+                        arrivals.push(Arrival {
+                            tick,
+                            id: n.id,
+                            class: n.class,
+                            length_m: n.length_m(),
+                            s_m: n.front_s_m,
+                            speed_m_s: n.speed_m_s.max(0.0),
+                            lane: n.lane,
+                            leaves_s_m: f64::INFINITY,
+                        });
+                        last_seen.push((tick, n.front_s_m));
+                    }
+                }
+                if n.front_s_m > end_m - BEYOND_M
+                    && let Some((sum, count)) = near_end.get_mut(usize::from(n.lane))
+                {
+                    (*sum, *count) = (*sum + n.speed_m_s, *count + 1.0);
+                }
+            }
+            for (held, (sum, count)) in held.iter_mut().zip(near_end) {
+                if count > 0.0 {
+                    let new = sum / count;
+                    let part = TICK_S / MEAN_S;
+                    *held = if held.is_finite() { *held + part * (new - *held) } else { new };
+                }
+            }
+            beyond_m_s.push(held.clone());
+        }
+        let last_tick = ticks.saturating_sub(2);
+        for (arrival, (tick, s_m)) in arrivals.iter_mut().zip(last_seen) {
+            if tick < last_tick && s_m < end_m - SIDEWAYS_M {
+                arrival.leaves_s_m = s_m;
+            }
+        }
+        Ok(Self { arrivals, beyond_m_s })
+    }
+
+    /// Time that it covers, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.beyond_m_s.len() as f64 * TICK_S
+    }
+
+    /// Vehicles that are there at the start.
+    #[must_use]
+    pub fn at_start(&self) -> usize {
+        self.arrivals.iter().filter(|a| a.tick == 0).count()
+    }
+
+    /// Vehicles that come later.
+    #[must_use]
+    pub fn later(&self) -> usize {
+        self.arrivals.len() - self.at_start()
+    }
+
+    /// Speed beyond the end of each lane at a tick, m/s.
+    pub(crate) fn beyond_m_s(&self, tick: u64) -> &[f64] {
+        let k = (tick as usize).min(self.beyond_m_s.len().saturating_sub(1));
+        self.beyond_m_s.get(k).map(Vec::as_slice).unwrap_or_default()
+    }
+}
+
+impl Engine {
+    /// Begins with the vehicles of a boundary, and lets in those that come later.
+    pub(crate) fn bound(&mut self, boundary: Arc<Boundary>) {
+        self.state.fleet = Fleet::default();
+        (self.state.tick, self.state.next_arrival) = (0, boundary.at_start());
+        for a in boundary.arrivals.iter().filter(|a| a.tick == 0) {
+            self.put(a, a.speed_m_s);
+        }
+        self.boundary = Some(boundary);
+    }
+
+    /// Lets in who is due. A vehicle that finds no room waits for it where it came.
+    pub(crate) fn let_in_measured(&mut self, boundary: &Boundary) {
+        let mut late = std::mem::take(&mut self.state.late);
+        while boundary
+            .arrivals
+            .get(self.state.next_arrival)
+            .is_some_and(|a| a.tick <= self.state.tick)
+        {
+            late.push(self.state.next_arrival);
+            self.state.next_arrival += 1;
+        }
+        late.retain(|&k| {
+            let Some(a) = boundary.arrivals.get(k) else { return false };
+            let speed_m_s = self.speed_with_room(a);
+            if let Some(speed_m_s) = speed_m_s {
+                self.put(a, speed_m_s);
+            }
+            speed_m_s.is_none()
+        });
+        self.state.late = late;
+    }
+
+    /// Speed at which a vehicle can come in where it comes without hard braking by anyone: its own,
+    /// or that of its leader if it is slower; `None`: there is no room.
+    fn speed_with_room(&self, a: &Arrival) -> Option<f64> {
+        let fleet = &self.state.fleet;
+        let idm = self.measured_driver(a).idm;
+        let place = fleet.s_m.partition_point(|&s| s <= a.s_m);
+        let ahead = (place..fleet.len()).find(|&i| fleet.occupies(i, a.lane));
+        let behind = (0..place).rev().find(|&i| fleet.occupies(i, a.lane));
+        let fits = |v: f64| {
+            let ahead_fits = ahead.is_none_or(|i| {
+                let gap = fleet.rear_m(i) - a.s_m;
+                gap > idm.min_gap_m
+                    && idm.interaction_m_s2(v, gap, v - fleet.v_m_s[i]) > -idm.decel_m_s2
+            });
+            let behind_fits = behind.is_none_or(|i| {
+                let (gap, own) = (a.s_m - a.length_m - fleet.s_m[i], fleet.driver[i].idm);
+                let own_v = fleet.v_m_s[i];
+                gap > own.min_gap_m
+                    && own.interaction_m_s2(own_v, gap, own_v - v) > -own.max_decel_m_s2
+            });
+            ahead_fits && behind_fits
+        };
+        let matched = ahead.map_or(a.speed_m_s, |i| fleet.v_m_s[i].min(a.speed_m_s));
+        [a.speed_m_s, matched].into_iter().find(|&v| fits(v))
+    }
+
+    /// The driver of a measured vehicle: drawn as any other, but who was measured at a speed wishes
+    /// at least that speed.
+    fn measured_driver(&self, a: &Arrival) -> Driver {
+        let drawn = Driver::of_class(&self.config, a.id, a.class, std::iter::empty());
+        let mut idm = drawn.idm;
+        idm.desired_speed_m_s = idm.desired_speed_m_s.max(a.speed_m_s);
+        Driver { idm, length_m: a.length_m, leaves_s_m: a.leaves_s_m, ..drawn }
+    }
+
+    fn put(&mut self, a: &Arrival, speed_m_s: f64) {
+        if usize::from(a.lane) < self.map.lanes.len() {
+            let driver = self.measured_driver(a);
+            self.state.fleet.insert(a.s_m, speed_m_s, a.lane, a.id, driver);
+            self.state.next_id = self.state.next_id.max(a.id + 1);
+        }
+    }
+}
