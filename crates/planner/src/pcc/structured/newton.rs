@@ -96,22 +96,32 @@ impl Structured {
         }
         let (mut primals, mut sums) = ([0.0; ROWS], [0.0; ROWS]);
         let (mut dual, mut count) = (0.0f64, (ROWS * n) as f64);
+        // Slices of known length: no bounds to check and no pointers to read again in the sweep.
+        let (rows, parts) = (&mut self.rows[..n], &mut self.parts[..n]);
+        let (m0, m1) = (&mut self.band.m0[..n], &mut self.band.m1[..n]);
+        let (grad_e, grad_b) = (&mut self.grad_e[..n], &mut self.grad_b[..n]);
+        let (base, energy, brake, below) =
+            (&mut self.base[..n], &self.e[..n], &self.b[..n], &self.u[..n]);
+        let (of_a0, of_a1, of_r) = (&sub.a0[..n], &sub.a1[..n], &sub.r[..n]);
+        let (phi0, phi1, kink) = (&sub.phi0[..n], &sub.phi1[..n], &sub.kink[..n]);
+        let (discount, e_max, e_min) = (&sub.discount[..n], &sub.e_max[1..=n], &sub.e_min[1..=n]);
+        let (bb, q0, q1) = (&self.quad.bb[..n], &self.quad.x0[..n], &self.quad.x1[..n]);
         let mut e0 = sub.start_e;
         for k in 0..n {
             let ended = fixed && k + 1 == n;
-            let row = &mut self.rows[k];
-            let (a0, a1, half) = (sub.a0[k], sub.a1[k], 0.5 * sub.phi1[k]);
-            let (e1, b, u) = (self.e[k], self.b[k], self.u[k]);
-            let p = a0 * e0 + a1 * e1 + b + sub.r[k];
+            let row = &mut rows[k];
+            let (a0, a1, half) = (of_a0[k], of_a1[k], 0.5 * phi1[k]);
+            let (e1, b, u) = (energy[k], brake[k], below[k]);
+            let p = a0 * e0 + a1 * e1 + b + of_r[k];
             let over = [
                 -p,
-                p - half * (e0 + e1) - sub.phi0[k],
+                p - half * (e0 + e1) - phi0[k],
                 b - sub.b_max,
                 -b,
-                u - sub.kink[k],
+                u - kink[k],
                 u - p,
-                e1 - sub.e_max[k + 1],
-                sub.e_min[k + 1] - e1,
+                e1 - e_max[k],
+                e_min[k] - e1,
             ];
             for (i, over) in over.into_iter().enumerate() {
                 row.inverse_s[i] = 1.0 / row.s[i];
@@ -130,33 +140,32 @@ impl Structured {
             let (zp, zb, zu, ze) = gather(&row.z);
             let (tp, tb, tu, te) = gather(&times(&w, &row.rp));
             let (bend_z, bend_t) = (half * row.z[1], half * w[1] * row.rp[1]);
-            let own_b = self.grad_b[k];
-            self.grad_e[k] += a1 * zp - bend_z + ze;
-            self.grad_b[k] = own_b + zp + zb;
-            let right_u = sub.discount[k] - tu;
-            let of_u = zu - sub.discount[k];
-            dual = dual.max(self.grad_b[k].abs()).max(of_u.abs());
+            let own_b = grad_b[k];
+            grad_e[k] += a1 * zp - bend_z + ze;
+            grad_b[k] = own_b + zp + zb;
+            let right_u = discount[k] - tu;
+            let of_u = zu - discount[k];
+            dual = dual.max(grad_b[k].abs()).max(of_u.abs());
             // u eliminated: row 5 becomes a weight on p, in series with row 4.
             let inverse_u = 1.0 / (w[4] + w[5]);
             let wp = w[0] + w[4] * w[5] * inverse_u;
             let share_u = w[5] * inverse_u * right_u;
             let (f0, f1) = (a0 - half, a1 - half);
-            let q = &self.quad;
-            let inverse_b = 1.0 / (q.bb[k] + wp + w[1] + w[2] + w[3]);
-            let x1 = q.x1[k] + wp * a1 + w[1] * f1;
+            let inverse_b = 1.0 / (bb[k] + wp + w[1] + w[2] + w[3]);
+            let x1 = q1[k] + wp * a1 + w[1] * f1;
             let right_b = share_u - own_b - tp - tb;
             let share_b = inverse_b * right_b;
-            self.band.m0[k] += wp * a1 * a1 + w[1] * f1 * f1 + w[6] + w[7] - x1 * x1 * inverse_b;
-            self.base[k] += a1 * (share_u - tp) + bend_t - te - x1 * share_b;
+            m0[k] += wp * a1 * a1 + w[1] * f1 * f1 + w[6] + w[7] - x1 * x1 * inverse_b;
+            base[k] += a1 * (share_u - tp) + bend_t - te - x1 * share_b;
             let mut x0 = 0.0;
             if k > 0 {
-                x0 = q.x0[k] + wp * a0 + w[1] * f0;
-                self.grad_e[k - 1] += a0 * zp - bend_z;
-                self.base[k - 1] += a0 * (share_u - tp) + bend_t - x0 * share_b;
-                self.band.m0[k - 1] += wp * a0 * a0 + w[1] * f0 * f0 - x0 * x0 * inverse_b;
-                self.band.m1[k - 1] += wp * a0 * a1 + w[1] * f0 * f1 - x0 * x1 * inverse_b;
+                x0 = q0[k] + wp * a0 + w[1] * f0;
+                grad_e[k - 1] += a0 * zp - bend_z;
+                base[k - 1] += a0 * (share_u - tp) + bend_t - x0 * share_b;
+                m0[k - 1] += wp * a0 * a0 + w[1] * f0 * f0 - x0 * x0 * inverse_b;
+                m1[k - 1] += wp * a0 * a1 + w[1] * f0 * f1 - x0 * x1 * inverse_b;
             }
-            self.parts[k] = Eliminated { w5: w[5], inverse_u, x0, x1, inverse_b, right_u, right_b };
+            parts[k] = Eliminated { w5: w[5], inverse_u, x0, x1, inverse_b, right_u, right_b };
             e0 = e1;
         }
         let (mut primal, mut sum) = (largest(&primals), sums.iter().sum::<f64>());
@@ -222,12 +231,14 @@ impl Structured {
             self.band.solve(&mut self.de);
         }
         self.border();
+        let n = sub.n;
         let (mut worsts, mut products) = ([0.0; ROWS], [0.0; ROWS]);
         let mut before = 0.0;
-        for k in 0..sub.n {
-            let (part, row) = (&self.parts[k], &mut self.rows[k]);
-            let de = self.de[k];
-            let (_, _, step) = part.recover(sub, k, before, de);
+        let (a0, a1, phi1) = (&sub.a0[..n], &sub.a1[..n], &sub.phi1[..n]);
+        let (parts, rows, de) = (&self.parts[..n], &mut self.rows[..n], &self.de[..n]);
+        for k in 0..n {
+            let (part, row, de) = (&parts[k], &mut rows[k], de[k]);
+            let (_, _, step) = part.recover([a0[k], a1[k], 0.5 * phi1[k]], before, de);
             let mut ratios = [0.0; ROWS];
             for i in 0..ROWS {
                 let ds = -row.rp[i] - step[i];
@@ -254,24 +265,26 @@ impl Structured {
     /// Corrector: centring to `target` and the second-order term. Returns the reach.
     pub(super) fn correct(&mut self, sub: &Subproblem, fixed: bool, target: f64) -> f64 {
         let n = sub.n;
+        let (a0, a1, phi1) = (&sub.a0[..n], &sub.a1[..n], &sub.phi1[..n]);
+        let (parts, rows, base) = (&mut self.parts[..n], &mut self.rows[..n], &mut self.base[..n]);
         for k in 0..n {
-            let (part, row) = (&mut self.parts[k], &mut self.rows[k]);
+            let (part, row) = (&mut parts[k], &mut rows[k]);
             for i in 0..ROWS {
                 // From here `dz` holds the second-order term until the step is recovered.
                 row.dz[i] = row.ds[i] * row.dz[i] - target;
             }
             let y = times(&row.dz, &row.inverse_s);
             let (yp, yb, yu, ye) = gather(&y);
-            let bend = 0.5 * sub.phi1[k] * y[1];
+            let bend = 0.5 * phi1[k] * y[1];
             let share_u = part.w5 * part.inverse_u * yu;
             let on_b = yp + yb + share_u;
             part.right_u += yu;
             part.right_b += on_b;
             let share_b = part.inverse_b * on_b;
             let on_p = yp + share_u;
-            self.base[k] += sub.a1[k] * on_p - bend + ye - part.x1 * share_b;
+            base[k] += a1[k] * on_p - bend + ye - part.x1 * share_b;
             if k > 0 {
-                self.base[k - 1] += sub.a0[k] * on_p - bend - part.x0 * share_b;
+                base[k - 1] += a0[k] * on_p - bend - part.x0 * share_b;
             }
         }
         if let Some(row) = &mut self.time {
@@ -299,12 +312,12 @@ impl Structured {
         self.border();
         let mut worsts = [0.0; ROWS];
         let mut before = 0.0;
+        let (parts, rows, de) = (&self.parts[..n], &mut self.rows[..n], &self.de[..n]);
+        let (db, du) = (&mut self.db[..n], &mut self.du[..n]);
         for k in 0..n {
-            let (part, row) = (&self.parts[k], &mut self.rows[k]);
-            let de = self.de[k];
-            let (db, du, step) = part.recover(sub, k, before, de);
-            self.db[k] = db;
-            self.du[k] = du;
+            let (part, row, de) = (&parts[k], &mut rows[k], de[k]);
+            let step;
+            (db[k], du[k], step) = part.recover([a0[k], a1[k], 0.5 * phi1[k]], before, de);
             let mut ratios = [0.0; ROWS];
             for i in 0..ROWS {
                 let ds = -row.rp[i] - step[i];
@@ -353,13 +366,13 @@ impl Structured {
 }
 
 impl Eliminated {
-    /// Brake, `u` and `C dx` of an interval from the steps of its energies.
+    /// Brake, `u` and `C dx` of an interval from the steps of its energies; `[a0, a1, φ'/2]`.
     #[inline]
-    fn recover(&self, sub: &Subproblem, k: usize, before: f64, de: f64) -> (f64, f64, [f64; ROWS]) {
+    fn recover(&self, [a0, a1, half]: [f64; 3], before: f64, de: f64) -> (f64, f64, [f64; ROWS]) {
         let db = (self.right_b - self.x1 * de - self.x0 * before) * self.inverse_b;
-        let dp = sub.a0[k] * before + sub.a1[k] * de + db;
+        let dp = a0 * before + a1 * de + db;
         let du = (self.right_u + self.w5 * dp) * self.inverse_u;
-        let bend = 0.5 * sub.phi1[k] * (before + de);
+        let bend = half * (before + de);
         (db, du, [-dp, dp - bend, db, -db, du, du - dp, de, -de])
     }
 }
