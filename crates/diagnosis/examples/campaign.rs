@@ -15,7 +15,9 @@ mod support;
 
 use std::path::Path;
 
-use diagnosis::{Channel, Diagnosis, Drive, DriveSet, Options, Plant, Serial, Verdict, diagnose};
+use diagnosis::{
+    Baseline, Channel, Diagnosis, Drive, DriveSet, Options, Plant, Serial, Verdict, diagnose_with,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::effects::{Effect, Magnitude, SIZES, Shape, hide};
@@ -278,6 +280,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let plant = Plant::reference()?;
     let usual = Campaign { drives: 8, ..campaign };
     let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
+    let baseline = Baseline::learn(&plant, &clean, &Serial)?;
     let mut t = Table::default();
     for case in 0..count.min(to) {
         let case_seed = seed.wrapping_mul(1_000_003) + case as u64;
@@ -308,7 +311,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 .collect();
         }
         let start = std::time::Instant::now();
-        let d = diagnose(&plant, &set, Some(&clean), &options, &Serial, &mut |_| {})?;
+        let d = diagnose_with(&plant, &set, Some(&baseline), &options, &Serial, &mut |_| {})?;
         let seconds = start.elapsed().as_secs_f64();
         t.seconds.push(seconds);
         let (mark, off) = t.count(&hidden, &d, deleted);

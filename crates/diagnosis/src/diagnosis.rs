@@ -214,9 +214,40 @@ const UNKNOWN_EVIDENCE: f64 = 30.0;
 /// substitute for a cause that the catalogue lacks leaves more.
 const LEFT_OVER: f64 = 0.08;
 
+/// Part of the evidence of one cause, and of several in the same module, above which a free function
+/// replaces them if they leave much over.
+const REPLACED_ONE: f64 = 1.0;
+const REPLACED_MANY: f64 = 0.5;
+
 /// Variance over that of drives in order, in a module that a cause explains, above which the cause
 /// is not sure.
 const MISFIT: f64 = 1.2;
+
+/// Timing, noise and tolerances of a truck and its logger, learned from drives that are in order.
+#[derive(Debug, Clone)]
+pub struct Baseline {
+    reference: Reference,
+    floor: Vec<DriveError>,
+}
+
+impl Baseline {
+    /// Learns from `drives` of the truck of `plant`; serves any number of diagnoses.
+    ///
+    /// # Errors
+    /// Drives that are too short or hold values that are no numbers.
+    pub fn learn(
+        plant: &Plant,
+        drives: &DriveSet,
+        executor: &dyn Executor,
+    ) -> Result<Self, DiagnosisError> {
+        crate::plausible::check_length(drives)?;
+        let clean = drives.drives.iter().map(|d| Prepared::new(d, plant)).collect();
+        let problem = Problem::learn(plant, clean, true, executor)?;
+        let zero = problem.reference.theta;
+        let floor = problem.drives.iter().map(|d| drive_error(d, plant, &zero)).collect();
+        Ok(Self { reference: problem.reference, floor })
+    }
+}
 
 /// Finds what the simulation of `plant` gets wrong on `drives` and names the cause.
 ///
@@ -232,9 +263,27 @@ pub fn diagnose(
     executor: &dyn Executor,
     progress: &mut dyn FnMut(Progress),
 ) -> Result<Diagnosis, DiagnosisError> {
+    split(drives, &options.hold_out)?;
+    crate::plausible::check_length(drives)?;
+    progress(Progress::Baseline);
+    let learned = baseline.map(|b| Baseline::learn(plant, b, executor)).transpose()?;
+    diagnose_with(plant, drives, learned.as_ref(), options, executor, progress)
+}
+
+/// The same with a baseline that was learned before.
+///
+/// # Errors
+/// No drive to learn from, or drives of another truck.
+pub fn diagnose_with(
+    plant: &Plant,
+    drives: &DriveSet,
+    baseline: Option<&Baseline>,
+    options: &Options,
+    executor: &dyn Executor,
+    progress: &mut dyn FnMut(Progress),
+) -> Result<Diagnosis, DiagnosisError> {
     let (learn, held) = split(drives, &options.hold_out)?;
     crate::plausible::check_length(drives)?;
-    baseline.map_or(Ok(()), crate::plausible::check_length)?;
     crate::plausible::check_truck(plant, drives)?;
     let prepare = |names: &[usize]| -> Vec<Prepared> {
         names.iter().map(|i| Prepared::new(&drives.drives[*i], plant)).collect()
@@ -242,15 +291,10 @@ pub fn diagnose(
     progress(Progress::Baseline);
     let (problem, floor) = match baseline {
         Some(b) => {
-            let clean = b.drives.iter().map(|d| Prepared::new(d, plant)).collect();
-            let p = Problem::learn(plant, clean, true, executor)?;
-            let zero = p.reference.theta;
-            let floor = p.drives.iter().map(|d| drive_error(d, plant, &zero)).collect();
-            (Problem::with(plant, prepare(&learn), p.reference, executor)?, floor)
+            let reference = b.reference.clone();
+            (Problem::with(plant, prepare(&learn), reference, executor)?, b.floor.as_slice())
         }
-        None => {
-            (Problem::learn(plant, prepare(&learn), false, executor)?, Vec::<DriveError>::new())
-        }
+        None => (Problem::learn(plant, prepare(&learn), false, executor)?, &[] as &[DriveError]),
     };
     let (open, not_observable) = observable(&problem, options);
     let fitted = problem.search(&open, options.max_causes, &mut |found| {
@@ -259,7 +303,7 @@ pub fn diagnose(
     let Some((empty, fit)) = fitted else {
         return Err(DiagnosisError::Numerics("no evidence can be computed".into()));
     };
-    let fit = problem.gate(fit, &empty, &open);
+    let fit = problem.gate(fit, &empty);
     progress(Progress::Unknown);
     let (fit, shape, sure) = outside(&problem, &empty, fit);
     let causes = causes(&problem, &fit, &empty, &open);
@@ -282,7 +326,7 @@ pub fn diagnose(
     let gain = (!held.is_empty() && !fit.set.is_empty())
         .then(|| gain(plant, &problem.reference, held, &fit, executor))
         .transpose()?;
-    let wrong = wrong(&problem, &floor);
+    let wrong = wrong(&problem, floor);
     let extended_truck = (!fit.set.is_empty()).then(|| format!("{}.extended.toml", plant.name));
     Ok(Diagnosis {
         schema: 1,
@@ -361,7 +405,9 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
         let mut out: Vec<Shape> = shapes
             .into_iter()
             .map(|mut s| {
-                s.log_z -= 3.0 * drives * problem.reference.free_form[s.module as usize].max(0.0);
+                let usual = problem.reference.free_form[s.module as usize].max(0.0);
+                s.log_z -= 3.0 * drives * usual;
+                s.firm -= 3.0 * drives * usual;
                 s
             })
             .collect();
@@ -386,20 +432,29 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
         })
     };
     let best_bare = bare.first().map_or(0.0, |s| s.log_z);
-    if best_bare > UNKNOWN_EVIDENCE && best_bare > 1.15 * fit.log_z {
+    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
         return (empty.clone(), describe(&bare), Sure::Outside);
     }
-    let left = rest.first().map_or(0.0, |s| s.log_z);
+    let left = rest.first().map_or(0.0, |s| s.firm);
     if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
         let module = rest.first().map(|s| s.module);
-        let shared = fit.set.iter().any(|h| {
-            let groups = CATALOGUE[*h].groups();
-            groups.iter().any(|g| module.is_some_and(|m| g.modules().contains(&m)))
-        });
-        let sure = match (fit.set.is_empty(), shared) {
+        let share = fit
+            .set
+            .iter()
+            .filter(|h| {
+                let groups = CATALOGUE[**h].groups();
+                groups.iter().any(|g| module.is_some_and(|m| g.modules().contains(&m)))
+            })
+            .count();
+        // Causes that leave much and that one free function replaces stand in for it.
+        let replaced = if share > 1 { REPLACED_MANY } else { REPLACED_ONE };
+        if share > 0 && best_bare > replaced * fit.log_z {
+            return (empty.clone(), describe(&bare), Sure::Outside);
+        }
+        let sure = match (fit.set.is_empty(), share) {
             (true, _) => Sure::Outside,
-            (false, true) => Sure::Not,
-            (false, false) => Sure::Yes,
+            (false, 0) => Sure::Yes,
+            (false, _) => Sure::Not,
         };
         return (fit, describe(&rest), sure);
     }

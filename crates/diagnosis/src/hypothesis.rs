@@ -69,7 +69,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         1.2,
         0.0,
     ),
-    h("mass", V, &[P::Mass], &[], ONE, LONG, 0.02, 0.0),
+    h(
+        "mass",
+        V,
+        &[P::Mass],
+        &[P::StiffnessFollowsMass],
+        &[[0.0, 0.0], [1.0, 0.0]],
+        LONG,
+        0.02,
+        0.0,
+    ),
     h("grade_bias", I, &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0),
     h("map_shift", I, &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0),
     h(

@@ -16,6 +16,7 @@ pub mod fidelity;
 mod finding;
 pub mod fit;
 mod gain;
+mod gate;
 mod hypothesis;
 pub mod lateral_id;
 pub mod logger;
@@ -30,6 +31,7 @@ mod read;
 mod replay;
 pub mod report;
 mod report_models;
+mod screen;
 mod search;
 mod sentence;
 mod stats;
@@ -38,8 +40,8 @@ mod unknown;
 
 pub use channel::Channel;
 pub use diagnosis::{
-    BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Options, Parameter, Progress,
-    Unknown, Verdict, Wrong, diagnose,
+    Baseline, BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Options, Parameter,
+    Progress, Unknown, Verdict, Wrong, diagnose, diagnose_with,
 };
 pub use drive::{Drive, DriveSet, RoadMap};
 pub use error::DiagnosisError;

@@ -85,7 +85,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
             From("engine.fan_on_k", ZERO_DEGC_K + FAN_FROM_DEGC, 1.0)
         }
         ("fan_load", "hysteresis_k") => Plus("engine.fan_hysteresis_k", 1.0),
-        ("payload_position", "stiffness_follows_load") => Carry::Implied,
+        ("mass" | "payload_position", "stiffness_follows_load") => Carry::Implied,
         ("dragging_brake", "force_n") => Plus("resistance.parasitic_force_n", 1.0),
         ("engine_friction", "friction_scale") => Times("engine.friction_scale_coeff"),
         ("altitude_derate", "torque_loss_per_km") => Plus("engine.derate_altitude_1_m", 1e-3),

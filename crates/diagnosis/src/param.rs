@@ -69,10 +69,11 @@ pub(crate) enum P {
     PressureLag,
     FanWidth,
     StiffnessFollows,
+    StiffnessFollowsMass,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 60;
+pub(crate) const PARAMS: usize = 61;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -174,6 +175,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::PressureLag, "lag_s", "s", (0.1, -0.5, 0.5, 0.02), 0.004, 0.05),
     s(P::FanWidth, "hysteresis_k", "K", (3.0, 0.0, 12.0, 0.5), 0.0, 0.0),
     s(P::StiffnessFollows, "stiffness_follows_load", "1", (1.0, 0.0, 1.0, 0.1), 0.0, 0.0),
+    s(P::StiffnessFollowsMass, "stiffness_follows_load", "1", (1.0, 0.0, 1.0, 0.1), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -197,6 +199,7 @@ impl Spec {
                 | P::FuelLowLoad
                 | P::FadeStart
                 | P::StiffnessFollows
+                | P::StiffnessFollowsMass
         )
     }
 }
@@ -204,6 +207,11 @@ impl Spec {
 impl P {
     pub(crate) fn spec(self) -> &'static Spec {
         &SPECS[self as usize]
+    }
+
+    /// A shape that is either off or on in truth.
+    pub(crate) fn is_switch(self) -> bool {
+        matches!(self, P::StiffnessFollows | P::StiffnessFollowsMass)
     }
 }
 

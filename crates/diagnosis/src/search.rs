@@ -6,24 +6,22 @@
 //! of what was already explained in the same modules, whichever is more. The relative rule stops
 //! helpers that patch the model-form error of a large effect.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
-use crate::hypothesis::{CATALOGUE, Hypothesis, Start};
+use crate::hypothesis::CATALOGUE;
 use crate::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, Problem};
 use crate::replay::MODULES;
-use crate::stats::evidence;
+use crate::screen::{Candidate, outside};
 
 /// Least evidence for another cause, nats.
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
 /// Part of the evidence already found in the same modules that another cause must add.
 pub(crate) const RELATIVE_EVIDENCE: f64 = 0.01;
-/// Sigmas by which a size must differ from nothing, once the drives' disagreement counts.
-const MIN_SIGMAS: f64 = 2.6;
-/// How many drives' worth the expectation counts that drives scatter as their information says.
-const DISPERSION_PRIOR: f64 = 4.0;
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
+/// Pairs refitted.
+const PAIRS: usize = 3;
 
 /// A set of causes, fitted.
 #[derive(Debug, Clone)]
@@ -43,16 +41,7 @@ pub(crate) struct Fit {
     pub(crate) explained: [f64; MODULES],
 }
 
-/// A hypothesis that was tried for the next place.
-#[derive(Debug, Clone)]
-pub(crate) struct Candidate {
-    pub(crate) hypothesis: usize,
-    pub(crate) start: Start,
-    /// Gain over the present set, nats, linear.
-    pub(crate) gain: f64,
-}
-
-fn directions(free: &[P], theta: &Theta) -> Vec<Direction> {
+pub(crate) fn directions(free: &[P], theta: &Theta) -> Vec<Direction> {
     free.iter()
         .map(|p| {
             let s = p.spec();
@@ -62,7 +51,7 @@ fn directions(free: &[P], theta: &Theta) -> Vec<Direction> {
         .collect()
 }
 
-fn prior(free: &[P]) -> Vec<f64> {
+pub(crate) fn prior(free: &[P]) -> Vec<f64> {
     free.iter().map(|p| p.spec().prior).collect()
 }
 
@@ -70,7 +59,8 @@ impl Problem<'_> {
     /// Fits the parameters of a set by Gauss-Newton with step halving, from `start`.
     pub(crate) fn fit(&self, set: &[usize], start: &Theta, zero_norm: f64) -> Option<Fit> {
         let zero = self.reference.theta;
-        let free: Vec<P> = set.iter().flat_map(|h| CATALOGUE[*h].params()).collect();
+        let free: Vec<P> =
+            set.iter().flat_map(|h| CATALOGUE[*h].params()).filter(|p| !p.is_switch()).collect();
         let sigma = prior(&free);
         let cost = |norm: f64, t: &Theta| {
             norm + free
@@ -129,113 +119,6 @@ impl Problem<'_> {
         Some(Fit { set: set.to_vec(), theta, log_z, free, covariance, gram, norm, explained })
     }
 
-    /// Variances of the free parameters, widened by what the drives disagree about.
-    ///
-    /// The drives' score contributions `s_i` scatter as the information says if the model's form
-    /// and tolerances are right; the ratio of both is the over-dispersion (the sandwich estimate
-    /// with drives as clusters: Liang and Zeger, Biometrika 73, 1986). Six drives know that ratio
-    /// poorly, so it is drawn towards one by [`DISPERSION_PRIOR`] drives' worth, and the interval
-    /// gets the t-factor of what is left.
-    pub(crate) fn variances(&self, fit: &Fit) -> Vec<f64> {
-        let zero = &self.reference.theta;
-        let sigma = prior(&fit.free);
-        let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
-        let pull = DVector::from_fn(k, |j, _| {
-            let p = fit.free[j] as usize;
-            (fit.theta[p] - zero[p]) / (sigma[j] * sigma[j] * drives)
-        });
-        let (mut seen, mut expected) = (vec![0.0; k], vec![0.0; k]);
-        for g in &fit.gram.per_drive {
-            let a = g.view((1, 1), (k, k));
-            let score = g.view((1, 0), (k, 1)).column(0) - &pull;
-            let moved = &fit.covariance * score;
-            let spread = &fit.covariance * a * &fit.covariance;
-            for j in 0..k {
-                seen[j] += moved[j] * moved[j];
-                expected[j] += spread[(j, j)];
-            }
-        }
-        let freedom = drives - 1.0 + DISPERSION_PRIOR;
-        let t_factor = 1.0 + 1.2 / freedom;
-        (0..k)
-            .map(|j| {
-                let ratio = seen[j] / expected[j].max(f64::MIN_POSITIVE) * drives;
-                let dispersion = (DISPERSION_PRIOR + ratio) / freedom;
-                fit.covariance[(j, j)] * dispersion.max(0.8) * t_factor * t_factor
-            })
-            .collect()
-    }
-
-    /// Gains of all hypotheses in `open` at the fit, best first.
-    pub(crate) fn screen(&self, fit: &Fit, open: &[usize]) -> Vec<Candidate> {
-        let mut dirs = directions(&fit.free, &fit.theta);
-        let k = dirs.len();
-        let mut columns: Vec<(usize, Start, Vec<usize>)> = Vec::new();
-        for h in open {
-            let hyp = &CATALOGUE[*h];
-            for start in hyp.starts {
-                let shape: Vec<(P, f64)> = hyp.shapes.iter().copied().zip(*start).collect();
-                let mut at = Vec::new();
-                for p in hyp.sizes {
-                    at.push(dirs.len());
-                    let step = p.spec().step;
-                    dirs.push(Direction { p: *p, shape: shape.clone(), step });
-                    if hyp.nonlinear() {
-                        dirs.push(Direction { p: *p, shape: shape.clone(), step: -step });
-                    }
-                }
-                if hyp.nonlinear() {
-                    let base = at[0];
-                    for signs in [[0, 2], [0, 3], [1, 2], [1, 3]] {
-                        columns.push((*h, *start, signs.iter().map(|s| base + s).collect()));
-                    }
-                } else {
-                    columns.push((*h, *start, at));
-                }
-            }
-        }
-        let (gram, _) = self.gram(&fit.theta, &dirs);
-        let (a, b, _) = gram.sum(|_| true);
-        let zero = &self.reference.theta;
-        let base = self.linear(fit, &a, &b, &(0..k).collect::<Vec<_>>(), &dirs, zero);
-        let mut out: Vec<Candidate> = columns
-            .iter()
-            .filter_map(|(h, start, cols)| {
-                let keep: Vec<usize> = (0..k).chain(cols.iter().copied()).collect();
-                let (z, x) = self.linear(fit, &a, &b, &keep, &dirs, zero)?;
-                let hyp: &Hypothesis = &CATALOGUE[*h];
-                let size = x[k];
-                let wrong_sign = hyp.sign != 0.0 && size * hyp.sign < 0.0;
-                let gain = z - base.as_ref().map_or(0.0, |b| b.0);
-                (!wrong_sign).then_some(Candidate { hypothesis: *h, start: *start, gain })
-            })
-            .collect();
-        out.sort_by(|x, y| y.gain.total_cmp(&x.gain));
-        out
-    }
-
-    /// Linear evidence around the fit with the prior centred at no effect.
-    fn linear(
-        &self,
-        fit: &Fit,
-        a: &DMatrix<f64>,
-        b: &DVector<f64>,
-        keep: &[usize],
-        dirs: &[Direction],
-        zero: &Theta,
-    ) -> Option<(f64, DVector<f64>)> {
-        let ps: Vec<P> = keep.iter().map(|i| dirs[*i].p).collect();
-        let (a, b) = (evidence::sub(a, keep), evidence::pick(b, keep));
-        // Residual at zero in the linear model: r0 = r + G (theta - zero) for the free ones.
-        let k = fit.free.len();
-        let shift = DVector::from_fn(ps.len(), |i, _| {
-            if i < k { fit.theta[ps[i] as usize] - zero[ps[i] as usize] } else { 0.0 }
-        });
-        let b0 = &b + &a * &shift;
-        let (z, x) = evidence::linear(&a, &b0, &prior(&ps))?;
-        Some((z, x))
-    }
-
     /// The best set of causes from the catalogue without `excluded` and what cannot be observed.
     pub(crate) fn search(
         &self,
@@ -257,7 +140,56 @@ impl Problem<'_> {
             best = next;
             best = self.drop_and_swap(best, open, zero_norm);
         }
+        if let Some(better) = self.pair_step(&best, &empty, open, zero_norm) {
+            best = self.drop_and_swap(better, open, zero_norm);
+        }
         Some((empty, best))
+    }
+
+    /// Two causes at once where one at a time stops: every member in turn (or nothing) is replaced
+    /// by the best pairs of the whole catalogue.
+    fn pair_step(&self, best: &Fit, empty: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
+        let mut places: Vec<Fit> = Vec::new();
+        for i in 0..best.set.len() {
+            let (fewer, theta) = self.without(best, i);
+            places.push(if fewer.is_empty() {
+                empty.clone()
+            } else {
+                self.fit(&fewer, &theta, zero_norm)?
+            });
+        }
+        if places.is_empty() {
+            places.push(empty.clone());
+        }
+        let mut pairs: Vec<(f64, usize, [Candidate; 2])> = Vec::new();
+        for (i, f) in places.iter().enumerate() {
+            let lost = best.log_z - f.log_z;
+            let there: Vec<usize> =
+                best.set.iter().copied().filter(|h| !f.set.contains(h)).collect();
+            let fresh = |p: &[Candidate; 2]| {
+                !p.iter().all(|c| there.contains(&c.hypothesis)) && p[0].gain > 0.85 * lost
+            };
+            let found = self.screen_pairs(f, &outside(f, open));
+            let found = found.into_iter().filter(|p| fresh(p)).take(PAIRS);
+            pairs.extend(found.map(|p| (p[0].gain - lost, i, p)));
+        }
+        pairs.sort_by(|x, y| y.0.total_cmp(&x.0));
+        let mut winner: Option<Fit> = None;
+        for (_, i, pair) in pairs.iter().take(PAIRS) {
+            let Some(one) = self.with_added(&places[*i], &pair[0], zero_norm) else { continue };
+            let Some(both) = self.with_added(&one, &pair[1], zero_norm) else { continue };
+            let needed = if both.set.len() > best.set.len() {
+                self.threshold(&one, &both).max(self.threshold(best, &both))
+            } else {
+                1.0
+            };
+            if both.log_z > best.log_z + needed
+                && winner.as_ref().is_none_or(|w| both.log_z > w.log_z)
+            {
+                winner = Some(both);
+            }
+        }
+        winner
     }
 
     /// What `next` must add to `best`.
@@ -271,17 +203,14 @@ impl Problem<'_> {
             .flat_map(|g| g.modules())
             .map(|m| best.explained[*m as usize].max(0.0))
             .sum();
+        // What the tolerances would have taken anyway was not explained by the set.
+        let there = there.min(best.log_z);
         let relative = if best.set.is_empty() { 0.0 } else { RELATIVE_EVIDENCE * there };
         MIN_EVIDENCE.max(relative)
     }
 
     fn step(&self, best: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
-        let rest: Vec<usize> = open
-            .iter()
-            .copied()
-            .filter(|h| best.set.iter().all(|s| CATALOGUE[*s].id != CATALOGUE[*h].id))
-            .collect();
-        let candidates = self.screen(best, &rest);
+        let candidates = self.screen(best, &outside(best, open));
         let top = candidates.first()?.gain;
         let mut tried: Vec<usize> = Vec::new();
         let mut winner: Option<Fit> = None;
@@ -308,19 +237,29 @@ impl Problem<'_> {
         winner
     }
 
+    /// The set with a candidate added, fitted from its start; from all of its starts if its shape is
+    /// a switch, which a fit holds.
     pub(crate) fn with_added(&self, best: &Fit, c: &Candidate, zero_norm: f64) -> Option<Fit> {
         let hyp = &CATALOGUE[c.hypothesis];
+        let starts = if hyp.shapes.iter().any(|p| p.is_switch()) {
+            hyp.starts
+        } else {
+            core::slice::from_ref(&c.start)
+        };
         let mut set = best.set.clone();
         set.push(c.hypothesis);
-        let mut theta = best.theta;
-        for (p, start) in hyp.shapes.iter().zip(c.start) {
-            theta[*p as usize] = start;
-        }
-        for p in hyp.sizes {
-            theta[*p as usize] = self.reference.theta[*p as usize]
-                + 0.5 * p.spec().step * if hyp.sign < 0.0 { -1.0 } else { 1.0 };
-        }
-        self.fit(&set, &theta, zero_norm)
+        let fits = starts.iter().filter_map(|start| {
+            let mut theta = best.theta;
+            for (p, start) in hyp.shapes.iter().zip(start) {
+                theta[*p as usize] = *start;
+            }
+            for p in hyp.sizes {
+                theta[*p as usize] = self.reference.theta[*p as usize]
+                    + 0.5 * p.spec().step * if hyp.sign < 0.0 { -1.0 } else { 1.0 };
+            }
+            self.fit(&set, &theta, zero_norm)
+        });
+        fits.max_by(|x, y| x.log_z.total_cmp(&y.log_z))
     }
 
     /// Drops members that no longer pay, then tries another hypothesis in every place.
@@ -340,12 +279,7 @@ impl Problem<'_> {
                     continue;
                 }
                 if round == 0 {
-                    let rest: Vec<usize> = open
-                        .iter()
-                        .copied()
-                        .filter(|h| best.set.iter().all(|s| CATALOGUE[*s].id != CATALOGUE[*h].id))
-                        .collect();
-                    let alternatives = self.screen(&f, &rest);
+                    let alternatives = self.screen(&f, &outside(&best, open));
                     for c in alternatives.iter().take(2) {
                         if f.log_z + c.gain < best.log_z - 20.0 - 0.1 * (best.log_z - f.log_z) {
                             continue;
@@ -378,94 +312,5 @@ impl Problem<'_> {
         }
         debug_assert_eq!(theta.len(), PARAMS);
         (set, theta)
-    }
-}
-
-impl Problem<'_> {
-    /// Information about the first size of every hypothesis at the reference, best start.
-    pub(crate) fn information(&self) -> Vec<f64> {
-        let mut dirs = Vec::new();
-        let mut owner = Vec::new();
-        for (i, h) in CATALOGUE.iter().enumerate() {
-            for start in h.starts {
-                let shape = h.shapes.iter().copied().zip(*start).collect();
-                let p = h.sizes[0];
-                dirs.push(Direction { p, shape, step: p.spec().step });
-                owner.push(i);
-            }
-        }
-        let (gram, _) = self.gram(&self.reference.theta, &dirs);
-        let (a, _, _) = gram.sum(|_| true);
-        let mut out = vec![0.0_f64; CATALOGUE.len()];
-        for (j, i) in owner.iter().enumerate() {
-            out[*i] = out[*i].max(a[(j, j)]);
-        }
-        out
-    }
-
-    /// Takes out causes that are too small for a word, within the drives' disagreement, or that do not pay on drives they were not
-    /// fitted to (two folds of whole drives, linear refit around the joint fit).
-    pub(crate) fn gate(&self, fit: Fit, empty: &Fit, _open: &[usize]) -> Fit {
-        let mut fit = fit;
-        let mut i = 0;
-        while i < fit.set.len() {
-            let hyp = &CATALOGUE[fit.set[i]];
-            let size = hyp.size(&fit.theta, &self.reference.theta).abs();
-            let small = size < 0.25 * hyp.min_size || !self.stands_out(&fit, i);
-            if small || self.folds(&fit, i) < 3.0 {
-                let (set, theta) = self.without(&fit, i);
-                match self.fit(&set, &theta, empty.norm) {
-                    Some(f) => fit = f,
-                    None => return empty.clone(),
-                }
-                i = 0;
-            } else {
-                i += 1;
-            }
-        }
-        fit
-    }
-
-    /// A size of the `i`-th member is beyond what the drives disagree about.
-    fn stands_out(&self, fit: &Fit, member: usize) -> bool {
-        let variances = self.variances(fit);
-        let sizes = CATALOGUE[fit.set[member]].sizes;
-        fit.free.iter().zip(&variances).any(|(p, v)| {
-            let x = fit.theta[*p as usize] - self.reference.theta[*p as usize];
-            sizes.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
-        })
-    }
-
-    /// Gain of the `i`-th member on unseen halves of the drives, nats.
-    fn folds(&self, fit: &Fit, member: usize) -> f64 {
-        if self.drives.len() < 2 {
-            return f64::INFINITY;
-        }
-        let zero = &self.reference.theta;
-        let sigma = prior(&fit.free);
-        let own: Vec<bool> =
-            fit.free.iter().map(|p| CATALOGUE[fit.set[member]].params().any(|q| q == *p)).collect();
-        let x0 = DVector::from_iterator(
-            fit.free.len(),
-            fit.free.iter().map(|p| fit.theta[*p as usize] - zero[*p as usize]),
-        );
-        let others: Vec<usize> = (0..own.len()).filter(|j| !own[*j]).collect();
-        let all: Vec<usize> = (0..own.len()).collect();
-        let mut gain = 0.0;
-        for fold in 0..2 {
-            let (a, b, _) = fit.gram.sum(|d| d % 2 != fold);
-            let (at, bt, _) = fit.gram.sum(|d| d % 2 == fold);
-            let (b, bt) = (&b + &a * &x0, &bt + &at * &x0);
-            let score = |keep: &[usize]| -> Option<f64> {
-                let s: Vec<f64> = keep.iter().map(|j| sigma[*j]).collect();
-                let (_, x) =
-                    evidence::linear(&evidence::sub(&a, keep), &evidence::pick(&b, keep), &s)?;
-                let (at, bt) = (evidence::sub(&at, keep), evidence::pick(&bt, keep));
-                Some(bt.dot(&x) - 0.5 * (&at * &x).dot(&x))
-            };
-            gain += score(&all).unwrap_or(0.0)
-                - if others.is_empty() { 0.0 } else { score(&others).unwrap_or(0.0) };
-        }
-        gain
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct Shape {
     pub(crate) signal: &'static str,
     /// Evidence over the present model, nats.
     pub(crate) log_z: f64,
+    /// The same as far as the drives agree about it.
+    pub(crate) firm: f64,
     /// Signal at the knots and the module's error there.
     pub(crate) knots: Vec<(f64, f64)>,
     /// Part of the module's explainable excess that it takes.
@@ -49,6 +51,8 @@ const SIGNALS: &[(&str, Read)] = &[
     ("yaw_rate_rad_s", |d, i| d.yaw[i]),
     ("accel_y_m_s2", |d, i| d.accel_y[i]),
     ("steering_wheel_rad", |d, i| d.steer[i]),
+    ("trailer_yaw_rate_rad_s", |d, i| d.trailer_yaw[i]),
+    ("s_map_m", |d, i| d.s_map[i]),
 ];
 
 /// Modules that are searched, with the prior size of an unknown effect in the module's unit (per
@@ -71,6 +75,9 @@ fn own(module: Module, signal: &str) -> bool {
     module.quantity() == signal && module != Module::Force
 }
 
+/// How many drives' worth the expectation counts that drives scatter as their noise says.
+const DISPERSION_PRIOR: f64 = 2.0;
+
 /// Excess of the whitened variance over drives in order that no tolerance explains.
 const RESTLESS: f64 = 1.1;
 
@@ -82,6 +89,27 @@ fn means(d: &Prepared, read: Read, step: usize) -> Vec<f64> {
             (from..to).map(|i| read(d, i)).sum::<f64>() / (to - from).max(1) as f64
         })
         .collect()
+}
+
+/// How much more the drives disagree about a free function than their noise says, at least 1: the
+/// ratio of their score contributions to the expected ones, drawn towards one by
+/// [`DISPERSION_PRIOR`] drives' worth. Bursts of model error (a hard stop) are not white noise, and
+/// evidence counts for less by this factor.
+fn dispersion(
+    systems: &[(DMatrix<f64>, DVector<f64>)],
+    a: &DMatrix<f64>,
+    w: &DVector<f64>,
+) -> Option<f64> {
+    let inverse = (a + DMatrix::identity(KNOTS, KNOTS)).try_inverse()?;
+    let drives = systems.len() as f64;
+    let (mut seen, mut expected) = (0.0, 0.0);
+    for (a, b) in systems {
+        let score = b - w / drives;
+        seen += score.dot(&(&inverse * &score));
+        expected += (a * &inverse).trace();
+    }
+    let ratio = drives * seen / f64::max(expected, 1e-9);
+    Some(((DISPERSION_PRIOR + ratio) / (DISPERSION_PRIOR + drives)).max(1.0))
 }
 
 impl Problem<'_> {
@@ -170,16 +198,25 @@ impl Problem<'_> {
                 values[i].iter().zip(&self.drives[i].valid[m]).map(place).collect();
             self.hats(i, m, &places, &residuals[i])
         });
-        let total = parts.iter().fold(DMatrix::zeros(KNOTS + 1, KNOTS + 1), |sum, g| sum + g);
         let kernel = DMatrix::from_fn(KNOTS, KNOTS, |i, j| {
             let x = (i as f64 - j as f64) / (KNOTS - 1) as f64 / LENGTH;
             (-0.5 * x * x).exp() + if i == j { 1e-3 } else { 0.0 }
         });
         let factor = kernel.cholesky()?.l() * size;
-        let a = factor.transpose() * total.view((1, 1), (KNOTS, KNOTS)) * &factor;
-        let b: DVector<f64> =
-            factor.transpose() * total.view((1, 0), (KNOTS, 1)).column(0).into_owned();
+        let gram = self.together(parts.into_iter());
+        let (a, b, _) = gram.sum(|_| true);
+        let inside = |a: &DMatrix<f64>| factor.transpose() * a * &factor;
+        let (a, b) = (inside(&a), factor.transpose() * b);
         let (log_z, w) = evidence::linear(&a, &b, &[1.0; KNOTS])?;
+        let systems: Vec<(DMatrix<f64>, DVector<f64>)> = gram
+            .per_drive
+            .iter()
+            .zip(gram.scores(&(&factor * &w)))
+            .map(|(g, b)| {
+                (inside(&g.view((1, 1), (KNOTS, KNOTS)).into_owned()), factor.transpose() * b)
+            })
+            .collect();
+        let firm = log_z - 0.5 * b.dot(&w) * (1.0 - 1.0 / dispersion(&systems, &a, &w)?);
         let f = &factor * &w;
         let taken = 2.0 * b.dot(&w) - (&a * &w).dot(&w);
         let rows: f64 =
@@ -190,6 +227,7 @@ impl Problem<'_> {
             module,
             signal,
             log_z,
+            firm,
             knots: (0..KNOTS).map(|k| (lo + k as f64 * width, f[k])).collect(),
             explained_frac: (taken / excess).clamp(0.0, 1.0),
         })

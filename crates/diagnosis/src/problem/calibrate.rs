@@ -17,7 +17,12 @@ const MEAN_PRIOR: f64 = 0.7;
 const SCATTER_ROUNDS: usize = 25;
 
 impl Reference {
-    pub(super) fn start(drives: &[Prepared], residuals: &[Residuals], theta: Theta) -> Self {
+    pub(super) fn start(
+        drives: &[Prepared],
+        residuals: &[Residuals],
+        theta: Theta,
+        clean: bool,
+    ) -> Self {
         let mut tolerance = [0.0; PARAMS];
         for (t, s) in tolerance.iter_mut().zip(&SPECS) {
             *t = s.scatter();
@@ -26,6 +31,7 @@ impl Reference {
         Self {
             theta,
             tolerance,
+            mean_spread: if clean { 0.0 } else { MEAN_PRIOR },
             whiteners,
             ratio: [1.0; MODULES],
             settled: [1.0; MODULES],

@@ -1,5 +1,7 @@
 //! Gram matrices in the metric of a drive.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::signals::Line;
@@ -9,9 +11,16 @@ use crate::replay::MODULES;
 use crate::unknown::KNOTS;
 
 /// Marginal Gram matrix per drive over `[r, columns]`.
+///
+/// The means of the tolerances are known from a few drives only. Their error is common to all
+/// drives: random effects beside those of each drive, marginalised when drives are summed.
 #[derive(Debug, Clone)]
 pub(crate) struct Gram {
     pub(crate) per_drive: Vec<DMatrix<f64>>,
+    /// Products of the common effects with `[r, columns]`, per drive.
+    common: Vec<DMatrix<f64>>,
+    /// Information of a drive about the common effects.
+    own: Arc<Vec<DMatrix<f64>>>,
 }
 
 impl Gram {
@@ -24,9 +33,44 @@ impl Gram {
                 total += g;
             }
         }
+        if let Some((against, means)) = self.means(&pick) {
+            total -= against.transpose() * means;
+        }
         let a = total.view((1, 1), (k - 1, k - 1)).into_owned();
         let b = total.view((1, 0), (k - 1, 1)).column(0).into_owned();
         (a, b, total[(0, 0)])
+    }
+
+    /// Products of the common effects with residual and columns over the drives chosen, and their
+    /// posterior means for each.
+    fn means(&self, pick: &impl Fn(usize) -> bool) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        let q = self.own.first()?.nrows();
+        let mut information = DMatrix::identity(q, q);
+        let mut against: Option<DMatrix<f64>> = None;
+        for (i, (own, c)) in self.own.iter().zip(&self.common).enumerate() {
+            if pick(i) {
+                information += own;
+                against = Some(against.map_or_else(|| c.clone(), |sum| sum + c));
+            }
+        }
+        let against = against?;
+        let means = information.cholesky()?.solve(&against);
+        Some((against, means))
+    }
+
+    /// Gradient of every drive after a step of `x` along the columns, once the common effects have
+    /// taken what they can.
+    pub(crate) fn scores(&self, x: &DVector<f64>) -> Vec<DVector<f64>> {
+        let k = x.len();
+        let means = self.means(&|_| true).map(|m| m.1.column(0) - m.1.columns(1, k) * x);
+        let scores = self.per_drive.iter().enumerate().map(|(i, g)| {
+            let own = g.view((1, 0), (k, 1)) - g.view((1, 1), (k, k)) * x;
+            match (&means, self.common.get(i)) {
+                (Some(u), Some(c)) => own - (c.transpose() * u).rows(1, k),
+                _ => own,
+            }
+        });
+        scores.map(|s| s.column(0).into_owned()).collect()
     }
 }
 
@@ -37,7 +81,8 @@ impl Problem<'_> {
         let parts = self.each(|i| {
             let mut lines = vec![self.at(i, theta)];
             lines.extend(directions.iter().map(|d| self.line(i, theta, d)));
-            (self.marginal(i, &lines), self.chi(i, &lines[0]))
+            let (gram, common) = self.marginal(i, &lines);
+            (gram, self.chi(i, &lines[0]), common)
         });
         let mut chi = [0.0; MODULES];
         for p in &parts {
@@ -45,7 +90,16 @@ impl Problem<'_> {
                 *c += x;
             }
         }
-        (Gram { per_drive: parts.into_iter().map(|p| p.0).collect() }, chi)
+        (self.together(parts.into_iter().map(|p| (p.0, p.2))), chi)
+    }
+
+    /// Gram matrices of all drives and their products with the common effects.
+    pub(crate) fn together(
+        &self,
+        parts: impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)>,
+    ) -> Gram {
+        let (per_drive, common) = parts.unzip();
+        Gram { per_drive, common, own: self.common.clone() }
     }
 
     /// Squared length of whitened signals per module.
@@ -68,31 +122,34 @@ impl Problem<'_> {
         out
     }
 
-    /// Gram matrix of given lines in the metric `M` of a drive.
-    fn marginal(&self, i: usize, lines: &[Line]) -> DMatrix<f64> {
+    /// Gram matrix of given lines in the metric `M` of a drive, and their products with the common
+    /// effects.
+    fn marginal(&self, i: usize, lines: &[Line]) -> (DMatrix<f64>, DMatrix<f64>) {
         let mut g = self.inner_products(i, lines);
         let against: Vec<DVector<f64>> = lines.iter().map(|l| self.against(i, l)).collect();
         if self.nuisance[i].sigma.is_empty() {
-            return g;
+            return (g, DMatrix::zeros(0, lines.len()));
         }
-        let zc = DMatrix::from_columns(&against);
-        if let Some(y) = self.nuisance[i].factor.l_dirty().solve_lower_triangular(&zc) {
+        let factor = &self.nuisance[i].factor;
+        let mut zc = DMatrix::from_columns(&against);
+        if let Some(y) = factor.l_dirty().solve_lower_triangular(&zc) {
             g -= y.transpose() * y;
         }
-        g
+        factor.solve_mut(&mut zc);
+        (g, zc * self.reference.mean_spread)
     }
 
     /// Marginal Gram matrix over the residual and hat functions of one module: `places` gives the
     /// knot to the left and the way to the next, per row. Only a few hats touch a row, so the
     /// whitened hats are never written out, and everything else comes to the hats through the
-    /// adjoint of the whitening filter.
+    /// adjoint of the whitening filter. With the products with the common effects.
     pub(crate) fn hats(
         &self,
         i: usize,
         m: usize,
         places: &[Option<(usize, f64)>],
         rest: &Rest,
-    ) -> DMatrix<f64> {
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
         let nuisance = &self.nuisance[i];
         let whitener = &self.reference.whiteners[m];
         let adjoint = self.adjoint(i, m);
@@ -145,6 +202,7 @@ impl Problem<'_> {
         if let Some(y) = nuisance.factor.l_dirty().solve_lower_triangular(&against) {
             out -= y.transpose() * y;
         }
-        out
+        nuisance.factor.solve_mut(&mut against);
+        (out, against * self.reference.mean_spread)
     }
 }

@@ -16,6 +16,10 @@ use calibrate::fit_whiteners;
 use nuisance::{Changed, Nuisance};
 use signals::Kept;
 
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
 use crate::param::{P, PARAMS, SPECS, Theta};
 use crate::replay::{GROUPS, MODULES, Prepared, Residuals, replay_group};
 use crate::stats::whiten::Whitener;
@@ -28,6 +32,8 @@ pub(crate) struct Reference {
     pub(crate) theta: Theta,
     /// Scatter between drives, per parameter; 0 where none.
     pub(crate) tolerance: [f64; PARAMS],
+    /// Standard deviation of the tolerances' means, in the scatter between drives.
+    pub(crate) mean_spread: f64,
     pub(crate) whiteners: Vec<Whitener>,
     /// Mean square of whitened residuals at the calibration, tolerances included, per module.
     pub(crate) ratio: [f64; MODULES],
@@ -43,6 +49,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) drives: Vec<Prepared>,
     pub(crate) reference: Reference,
     nuisance: Vec<Nuisance>,
+    /// Information of every drive about the means of the tolerances.
+    common: Arc<Vec<DMatrix<f64>>>,
     kept: Vec<Kept>,
     executor: &'a dyn Executor,
 }
@@ -75,9 +83,17 @@ impl<'a> Problem<'a> {
     ) -> Result<Self, DiagnosisError> {
         let theta = [0.0; PARAMS];
         let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
-        let reference = Reference::start(&drives, &residuals, theta);
+        let reference = Reference::start(&drives, &residuals, theta, clean);
         let kept = drives.iter().map(|_| Kept::default()).collect();
-        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), kept, executor };
+        let mut problem = Self {
+            plant,
+            drives,
+            reference,
+            nuisance: Vec::new(),
+            common: Arc::default(),
+            kept,
+            executor,
+        };
         problem.rebuild(Changed::Everything)?;
         for round in 0..2 {
             if clean || round > 0 {
@@ -94,6 +110,8 @@ impl<'a> Problem<'a> {
         if clean {
             problem.scatter();
             problem.rebuild(Changed::Scatter)?;
+            // What the baseline calls the mean is known up to its own scatter.
+            problem.reference.mean_spread = (1.0 / problem.drives.len() as f64).sqrt();
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
             problem.reference.settled = problem.settled(&problem.reference.theta);
             let count = problem.drives.len() as f64;
@@ -125,7 +143,15 @@ impl<'a> Problem<'a> {
         executor: &'a dyn Executor,
     ) -> Result<Self, DiagnosisError> {
         let kept = drives.iter().map(|_| Kept::default()).collect();
-        let mut problem = Self { plant, drives, reference, nuisance: Vec::new(), kept, executor };
+        let mut problem = Self {
+            plant,
+            drives,
+            reference,
+            nuisance: Vec::new(),
+            common: Arc::default(),
+            kept,
+            executor,
+        };
         problem.rebuild(Changed::Everything)?;
         Ok(problem)
     }

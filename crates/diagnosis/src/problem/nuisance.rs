@@ -1,6 +1,6 @@
 //! The tolerances of every drive: sensitivities, their Gram matrix, and what they can take.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -100,6 +100,12 @@ impl Problem<'_> {
             .into_iter()
             .collect::<Option<Vec<_>>>()
             .ok_or_else(|| DiagnosisError::Numerics("tolerances of a drive".into()))?;
+        let spread = self.reference.mean_spread.powi(2);
+        let information = |n: &Nuisance| {
+            let q = n.sigma.len();
+            (DMatrix::identity(q, q) - n.factor.inverse()) * spread
+        };
+        self.common = Arc::new(self.nuisance.iter().map(information).collect());
         Ok(())
     }
 

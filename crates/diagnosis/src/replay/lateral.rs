@@ -26,7 +26,7 @@ pub(crate) fn loaded(d: &Prepared, plant: &Plant, t: &Theta) -> LateralParameter
 /// of a payload that lies elsewhere.
 fn stiffness(d: &Prepared, plant: &Plant, t: &Theta) -> [f64; dynamics::lateral::AXLES] {
     let mut sheet = *t;
-    sheet[P::Mass as usize] = 0.0;
+    sheet[P::Mass as usize] *= t[P::StiffnessFollowsMass as usize];
     sheet[P::PayloadX as usize] *= t[P::StiffnessFollows as usize];
     let p = loaded(d, plant, &sheet);
     p.tyres.stiffness_n_rad(&p.static_axle_load_n())

@@ -199,6 +199,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::CTrailer
         | P::PayloadX
         | P::StiffnessFollows
+        | P::StiffnessFollowsMass
         | P::Bank
         | P::AccelYBias
         | P::TrailerYawBias => &[G::Lateral],

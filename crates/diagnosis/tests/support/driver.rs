@@ -78,7 +78,7 @@ impl Driver {
             self.stage = (stage * 100.0).round() / 100.0;
         }
         let hard = if error < -0.7 { (0.45 * (-error - 0.7)).min(1.5) } else { 0.0 };
-        self.xbr += (hard - self.xbr) * dt / 0.35;
+        self.xbr += (hard - self.xbr) * dt / 0.06;
         if self.xbr < 0.01 {
             self.xbr = 0.0;
         }

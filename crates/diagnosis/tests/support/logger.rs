@@ -20,7 +20,7 @@ const CHANNELS: &[(C, usize, f64, f64)] = &[
     (C::ShiftInProcess, 1, 1.0, 0.0),
     (C::EngineBrakeFrac, 1, 0.01, 0.0),
     (C::XbrDecelMS2, 1, 1.0 / 2048.0, 0.0),
-    (C::BrakePressureKpa, 2, 5.0, 0.0),
+    (C::BrakePressureKpa, 2, 5.0, 1.5),
     (C::SteeringWheelRad, 1, 1.0 / 1024.0, 0.0028),
     (C::YawRateRadS, 1, 1.0 / 8192.0, 0.0015),
     (C::TrailerYawRateRadS, 1, 1.0 / 8192.0, 0.002),
@@ -47,7 +47,9 @@ pub(crate) fn log(drive: &mut Drive, truth: &[Vec<f64>], rng: &mut ChaCha8Rng) {
         let mut held = 0.0;
         let samples = x.iter().enumerate().map(|(i, v)| {
             if i % hold == 0 {
-                let e = if *noise > 0.0 { noise * normal(rng) } else { 0.0 };
+                let released = *channel == C::BrakePressureKpa && *v < 1.0;
+                let quiet = *noise == 0.0 || released;
+                let e = if quiet { 0.0 } else { noise * normal(rng) };
                 let y = if *channel == C::FuelRateGS { v * (1.0 + e) } else { v + slow[i] + e };
                 held = if *step > 0.0 { (y / step).round() * step } else { y };
             }

@@ -1,0 +1,162 @@
+//! Which of the fitted causes are kept: large enough for a word, beyond what the drives disagree
+//! about, and worth something on drives that they were not fitted to.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::hypothesis::CATALOGUE;
+use crate::problem::{Direction, Problem};
+use crate::search::{Fit, prior};
+use crate::stats::evidence;
+
+/// Sigmas by which a size must differ from nothing, once the drives' disagreement counts.
+const MIN_SIGMAS: f64 = 2.6;
+/// How many drives' worth the expectation counts that drives scatter as their information says.
+const DISPERSION_PRIOR: f64 = 4.0;
+
+/// Part of the smallest size worth a word below which a cause is dropped.
+const WORTH: f64 = 0.5;
+/// Part of the information about a cause in one drive above which no other drive can confirm it.
+const LONELY: f64 = 0.85;
+
+impl Problem<'_> {
+    /// Variances of the free parameters, widened by what the drives disagree about.
+    ///
+    /// The drives' score contributions `s_i` scatter as the information says if the model's form
+    /// and tolerances are right; the ratio of both is the over-dispersion (the sandwich estimate
+    /// with drives as clusters: Liang and Zeger, Biometrika 73, 1986). Six drives know that ratio
+    /// poorly, so it is drawn towards one by [`DISPERSION_PRIOR`] drives' worth, and the interval
+    /// gets the t-factor of what is left.
+    pub(crate) fn variances(&self, fit: &Fit) -> Vec<f64> {
+        let zero = &self.reference.theta;
+        let sigma = prior(&fit.free);
+        let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
+        let pull = DVector::from_fn(k, |j, _| {
+            let p = fit.free[j] as usize;
+            (fit.theta[p] - zero[p]) / (sigma[j] * sigma[j] * drives)
+        });
+        let (mut seen, mut expected) = (vec![0.0; k], vec![0.0; k]);
+        for (g, score) in fit.gram.per_drive.iter().zip(fit.gram.scores(&DVector::zeros(k))) {
+            let a = g.view((1, 1), (k, k));
+            let score = score - &pull;
+            let moved = &fit.covariance * score;
+            let spread = &fit.covariance * a * &fit.covariance;
+            for j in 0..k {
+                seen[j] += moved[j] * moved[j];
+                expected[j] += spread[(j, j)];
+            }
+        }
+        let freedom = drives - 1.0 + DISPERSION_PRIOR;
+        let t_factor = 1.0 + 1.2 / freedom;
+        (0..k)
+            .map(|j| {
+                let ratio = seen[j] / expected[j].max(f64::MIN_POSITIVE) * drives;
+                let dispersion = (DISPERSION_PRIOR + ratio) / freedom;
+                fit.covariance[(j, j)] * dispersion.max(0.8) * t_factor * t_factor
+            })
+            .collect()
+    }
+
+    /// Information about the first size of every hypothesis at the reference, best start.
+    pub(crate) fn information(&self) -> Vec<f64> {
+        let mut dirs = Vec::new();
+        let mut owner = Vec::new();
+        for (i, h) in CATALOGUE.iter().enumerate() {
+            for start in h.starts {
+                let shape = h.shapes.iter().copied().zip(*start).collect();
+                let p = h.sizes[0];
+                dirs.push(Direction { p, shape, step: p.spec().step });
+                owner.push(i);
+            }
+        }
+        let (gram, _) = self.gram(&self.reference.theta, &dirs);
+        let (a, _, _) = gram.sum(|_| true);
+        let mut out = vec![0.0_f64; CATALOGUE.len()];
+        for (j, i) in owner.iter().enumerate() {
+            out[*i] = out[*i].max(a[(j, j)]);
+        }
+        out
+    }
+
+    /// Takes out causes that are too small for a word, within the drives' disagreement, or that do
+    /// not pay on drives they were not fitted to (two folds of whole drives, linear refit around
+    /// the joint fit).
+    pub(crate) fn gate(&self, fit: Fit, empty: &Fit) -> Fit {
+        let mut fit = fit;
+        let mut i = 0;
+        while i < fit.set.len() {
+            let hyp = &CATALOGUE[fit.set[i]];
+            let size = hyp.size(&fit.theta, &self.reference.theta).abs();
+            let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, i);
+            if small || self.folds(&fit, i) < 3.0 {
+                let (set, theta) = self.without(&fit, i);
+                match self.fit(&set, &theta, empty.norm) {
+                    Some(f) => fit = f,
+                    None => return empty.clone(),
+                }
+                i = 0;
+            } else {
+                i += 1;
+            }
+        }
+        fit
+    }
+
+    /// A size of the `i`-th member is beyond what the drives disagree about.
+    fn stands_out(&self, fit: &Fit, member: usize) -> bool {
+        let variances = self.variances(fit);
+        let sizes = CATALOGUE[fit.set[member]].sizes;
+        fit.free.iter().zip(&variances).any(|(p, v)| {
+            let x = fit.theta[*p as usize] - self.reference.theta[*p as usize];
+            sizes.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
+        })
+    }
+
+    /// Gain of the `i`-th member on unseen halves of the drives, nats.
+    fn folds(&self, fit: &Fit, member: usize) -> f64 {
+        if self.drives.len() < 2 {
+            return f64::INFINITY;
+        }
+        let zero = &self.reference.theta;
+        let sigma = prior(&fit.free);
+        let own: Vec<bool> =
+            fit.free.iter().map(|p| CATALOGUE[fit.set[member]].params().any(|q| q == *p)).collect();
+        let x0 = DVector::from_iterator(
+            fit.free.len(),
+            fit.free.iter().map(|p| fit.theta[*p as usize] - zero[*p as usize]),
+        );
+        let others: Vec<usize> = (0..own.len()).filter(|j| !own[*j]).collect();
+        let all: Vec<usize> = (0..own.len()).collect();
+        // Drives that say most about the member are dealt to the halves in turn; where one drive
+        // alone says it (hot brakes once), no other can confirm it.
+        let about = |g: &DMatrix<f64>| -> f64 {
+            (0..own.len()).filter(|j| own[*j]).map(|j| g[(j + 1, j + 1)] * sigma[j].powi(2)).sum()
+        };
+        let mut order: Vec<(usize, f64)> =
+            fit.gram.per_drive.iter().map(about).enumerate().collect();
+        order.sort_by(|x, y| y.1.total_cmp(&x.1));
+        let total: f64 = order.iter().map(|o| o.1).sum();
+        if order.first().is_none_or(|o| o.1 > LONELY * total) {
+            return f64::INFINITY;
+        }
+        // 0, 1, 1, 0, 0, 1, ...: the halves get the like.
+        let half = |d: usize| {
+            order.iter().position(|o| o.0 == d).is_some_and(|rank| rank.div_ceil(2) % 2 == 1)
+        };
+        let mut gain = 0.0;
+        for fold in [false, true] {
+            let (a, b, _) = fit.gram.sum(|d| half(d) != fold);
+            let (at, bt, _) = fit.gram.sum(|d| half(d) == fold);
+            let (b, bt) = (&b + &a * &x0, &bt + &at * &x0);
+            let score = |keep: &[usize]| -> Option<f64> {
+                let s: Vec<f64> = keep.iter().map(|j| sigma[*j]).collect();
+                let (_, x) =
+                    evidence::linear(&evidence::sub(&a, keep), &evidence::pick(&b, keep), &s)?;
+                let (at, bt) = (evidence::sub(&at, keep), evidence::pick(&bt, keep));
+                Some(bt.dot(&x) - 0.5 * (&at * &x).dot(&x))
+            };
+            gain += score(&all).unwrap_or(0.0)
+                - if others.is_empty() { 0.0 } else { score(&others).unwrap_or(0.0) };
+        }
+        gain
+    }
+}
