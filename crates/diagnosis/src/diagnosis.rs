@@ -405,9 +405,11 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
         let mut out: Vec<Shape> = shapes
             .into_iter()
             .map(|mut s| {
+                // Drives in order have their free functions too.
                 let usual = problem.reference.free_form[s.module as usize].max(0.0);
+                let agreed = s.firm / s.log_z.max(1e-9);
                 s.log_z -= 3.0 * drives * usual;
-                s.firm -= 3.0 * drives * usual;
+                s.firm = agreed * s.log_z;
                 s
             })
             .collect();

@@ -109,9 +109,9 @@ impl<'a> Problem<'a> {
         }
         if clean {
             problem.scatter();
-            problem.rebuild(Changed::Scatter)?;
             // What the baseline calls the mean is known up to its own scatter.
             problem.reference.mean_spread = (1.0 / problem.drives.len() as f64).sqrt();
+            problem.rebuild(Changed::Scatter)?;
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
             problem.reference.settled = problem.settled(&problem.reference.theta);
             let count = problem.drives.len() as f64;
