@@ -407,7 +407,7 @@ fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown
             .map(|mut s| {
                 // Drives in order have their free functions too.
                 let usual = problem.reference.free_form[s.module as usize].max(0.0);
-                let agreed = s.firm / s.log_z.max(1e-9);
+                let agreed = if s.log_z > 0.0 { (s.firm / s.log_z).clamp(0.0, 1.0) } else { 1.0 };
                 s.log_z -= 3.0 * drives * usual;
                 s.firm = agreed * s.log_z;
                 s
