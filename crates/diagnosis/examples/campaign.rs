@@ -18,6 +18,7 @@ use std::path::Path;
 use diagnosis::{
     Baseline, Channel, Diagnosis, Drive, DriveSet, Options, Plant, Serial, Verdict, diagnose_with,
 };
+use dynamics::TruckParameters;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use support::effects::{Effect, Magnitude, SIZES, Shape, hide};
@@ -277,7 +278,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         campaign.duration_s = s.parse()?;
     }
     let (from, to) = (number("from=", 0)?, number("to=", usize::MAX)?);
-    let plant = Plant::reference()?;
+    let plant = Plant::of_truck(&TruckParameters::load("reference")?)?;
     let usual = Campaign { drives: 8, ..campaign };
     let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
     let baseline = Baseline::learn(&plant, &clean, &Serial)?;

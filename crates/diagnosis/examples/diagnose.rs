@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use diagnosis::{Executor, Options, Plant, diagnose, read_drives};
+use dynamics::TruckParameters;
 
 struct Threads(usize);
 
@@ -29,7 +30,7 @@ impl Executor for Threads {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let drives = arguments.first().ok_or("usage: diagnose DRIVES_DIR [BASELINE_DIR]")?;
-    let plant = Plant::reference()?;
+    let plant = Plant::of_truck(&TruckParameters::load("reference")?)?;
     let drives = read_drives(Path::new(drives))?;
     let baseline = arguments.get(1).map(|b| read_drives(Path::new(b))).transpose()?;
     let d =

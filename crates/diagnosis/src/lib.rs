@@ -23,8 +23,6 @@ pub mod logger;
 mod overlay;
 mod param;
 mod plant;
-mod plant_reference;
-mod plant_truck;
 mod plausible;
 mod problem;
 mod read;

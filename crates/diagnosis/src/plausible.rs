@@ -50,7 +50,8 @@ pub(crate) fn check_length(set: &DriveSet) -> Result<(), DiagnosisError> {
 }
 
 pub(crate) fn check_truck(plant: &Plant, set: &DriveSet) -> Result<(), DiagnosisError> {
-    let gears = plant.gear_ratios.len();
+    let driveline = &plant.truck.driveline;
+    let gears = driveline.gear_ratios.len();
     let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); gears + 1];
     let mut beyond = 0_usize;
     for d in &set.drives {
@@ -78,7 +79,7 @@ pub(crate) fn check_truck(plant: &Plant, set: &DriveSet) -> Result<(), Diagnosis
         }
         r.sort_by(f64::total_cmp);
         let measured = r[r.len() / 2];
-        let expected = plant.gear_ratios[gear - 1] * plant.final_drive_ratio / plant.wheel_radius_m;
+        let expected = driveline.engine_speed_rad_s(1.0, gear as u8);
         if (measured / expected - 1.0).abs() > MAX_DEVIATION {
             wrong += r.len();
             if r.len() > worst.3 {

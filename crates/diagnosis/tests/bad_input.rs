@@ -15,7 +15,7 @@ fn set(drives: Vec<Drive>) -> DriveSet {
 
 /// Error text, or whether a cause is stated as sure.
 fn judge(set: &DriveSet) -> Result<bool, String> {
-    let plant = Plant::reference().unwrap();
+    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
     diagnose(&plant, set, None, &Options::default(), &Serial, &mut |_| {})
         .map(|d| d.verdict == Verdict::Explained)
         .map_err(|e| e.to_string())

@@ -6,6 +6,7 @@
 mod support;
 
 use diagnosis::{Diagnosis, DiagnosisError, DriveSet, Options, Plant, Serial, Verdict, diagnose};
+use dynamics::TruckParameters;
 use support::effects::{Effect, Shape};
 use support::outside::Outside;
 use support::{Campaign, generate};
@@ -17,7 +18,7 @@ fn drives(hidden: &[Effect], seed: u64) -> DriveSet {
 }
 
 fn judge(set: &DriveSet) -> Result<Diagnosis, DiagnosisError> {
-    let plant = Plant::reference().unwrap();
+    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
     let clean = drives(&[], 900);
     diagnose(&plant, set, Some(&clean), &Options::default(), &Serial, &mut |_| {})
 }

@@ -13,7 +13,7 @@ use tractrix_core::{BrakeMode, Command, Curve, GRAVITY_M_S2, GearRequest, RPM_PE
 
 use crate::effects::brake::GROUPS;
 use crate::effects::engine::Engine;
-use crate::effects::resistance::{AirFlow, air_density_kg_m3};
+use crate::effects::resistance::{AirFlow, air_density_kg_m3, grade_n};
 use crate::effects::shift::{ShiftPhase, ShiftState, TcuView};
 use crate::effects::table::{self, TableSignal};
 use crate::lateral::{AXLES, BodyForce, LateralInputs, LateralModel, LateralOutputs, LateralState};
@@ -308,11 +308,9 @@ impl TruckModel {
     fn engine_torque(&self, s: &mut TruckState, pedal: f64, full_load_nm: f64, retarder: f64) {
         let (e, p) = (&self.engine, &self.parameters.engine);
         let n = s.engine_speed_rad_s;
-        let friction = e.friction_nm(n);
-        let holding = friction + e.auxiliary_nm(n, s.fan_runs);
-        let governor = ((e.max_rad_s * 1.02 - n) / (e.max_rad_s * 0.04)).clamp(0.0, 1.0);
-        let mut demand =
-            e.pedal_demand_nm(pedal, n, full_load_nm).min(full_load_nm + friction) * governor;
+        let holding = e.friction_nm(n) + e.auxiliary_nm(n, s.fan_runs);
+        let wanted = e.pedal_demand_nm(pedal, n, full_load_nm);
+        let mut demand = e.governed_nm(wanted, n, full_load_nm);
         let shift = &self.parameters.shift;
         demand *= shift.torque_frac(&s.shift);
         if let (ShiftPhase::RampDown, Some(floor)) = (s.shift.phase, shift.ramp_floor_nm) {
@@ -335,8 +333,7 @@ impl TruckModel {
             (brake_target - s.engine_brake_nm) * (SUBSTEP_S / p.engine_brake_lag_s).min(1.0);
         let d = &self.parameters.driveline;
         let retarder_target = retarder * d.retarder_limit_nm(s.speed_m_s);
-        s.retarder_nm +=
-            (retarder_target - s.retarder_nm) * (SUBSTEP_S / d.retarder_lag_s).min(1.0);
+        s.retarder_nm = d.retarder_step_nm(s.retarder_nm, retarder_target, SUBSTEP_S);
         let burning = if s.shift.phase == ShiftPhase::Open { holding } else { s.engine_torque_nm };
         s.fuel_rate_g_s = e.fuel_rate_g_s(n, burning);
         s.fuel_g += s.fuel_rate_g_s * SUBSTEP_S;
@@ -445,9 +442,7 @@ impl TruckModel {
             }
         }
         let drive_limit = grip * self.brake_share[1] * self.mass_kg * GRAVITY_M_S2;
-        let retarder_n = d
-            .shaft_force_n(s.retarder_nm + d.hidden_retarder_torque_nm * (v / 5.0).clamp(0.0, 1.0))
-            .min(drive_limit);
+        let retarder_n = d.shaft_force_n(s.retarder_nm + d.hidden_retarder_nm(v)).min(drive_limit);
         let drive_n = wheel.drive_n.clamp(-drive_limit, drive_limit);
         axle_n[1] += 0.5 * (drive_n - retarder_n);
         axle_n[2] += 0.5 * (drive_n - retarder_n);
@@ -460,7 +455,7 @@ impl TruckModel {
             brake_n,
             rolling_n: r.rolling_n(self.mass_kg, v, cos, s.tyre_warmth),
             drag_n: r.drag_n(&air),
-            grade_n: self.mass_kg * GRAVITY_M_S2 * sin,
+            grade_n: grade_n(self.mass_kg, sin),
             curve_n: self.curve_drag_n(s),
             effective_mass_kg,
         };

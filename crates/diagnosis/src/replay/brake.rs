@@ -5,6 +5,9 @@ use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
+use dynamics::SUBSTEP_S;
+use dynamics::effects::brake::BrakeParameters;
+use tractrix_core::Curve;
 
 /// Pressure response, kPa, mean over two samples.
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
@@ -50,31 +53,39 @@ const MAX_RESOLUTION_KPA: f64 = 8.0;
 /// The pressure in the chambers, driven by the logged demand.
 struct Chambers<'a> {
     d: &'a Prepared,
+    brake: &'a BrakeParameters,
+    table: Option<Curve>,
     delay: f64,
-    gain: f64,
-    keep: f64,
-    up: f64,
-    down: f64,
     pressure_kpa: f64,
 }
 
+/// Steps of the chambers per sample, as in the truck model.
+const SUBSTEPS: usize = (Drive::STEP_S / SUBSTEP_S + 0.5) as usize;
+/// Pa per kPa.
+pub(super) const PA_PER_KPA: f64 = 1e3;
+
 impl<'a> Chambers<'a> {
-    fn new(d: &'a Prepared, plant: &Plant, t: &Theta) -> Self {
+    fn new(d: &'a Prepared, plant: &'a Plant, t: &Theta) -> Self {
+        let brake = &plant.truck.brake;
         Self {
             d,
-            delay: (plant.brake_delay_s + t[P::BrakeDelay as usize]) / Drive::STEP_S,
-            gain: d.mass_kg / plant.brake_gain_n_kpa,
-            keep: (-Drive::STEP_S / plant.brake_lag_s).exp(),
-            up: plant.brake_rate_kpa_s[0] * Drive::STEP_S,
-            down: plant.brake_rate_kpa_s[1] * Drive::STEP_S,
+            brake,
+            table: brake.pressure_table(d.mass_kg).ok().flatten(),
+            delay: (brake.dead_time_s + t[P::BrakeDelay as usize]) / Drive::STEP_S,
             pressure_kpa: 0.0,
         }
     }
 
     fn step(&mut self, i: usize) -> f64 {
-        let demand = self.gain * at_index(&self.d.xbr, i as f64 - self.delay).max(0.0);
-        let next = demand + (self.pressure_kpa - demand) * self.keep;
-        self.pressure_kpa += (next - self.pressure_kpa).clamp(-self.down, self.up);
+        let decel_m_s2 = at_index(&self.d.xbr, i as f64 - self.delay);
+        let demand_pa = self.brake.demand_pa(decel_m_s2, self.d.mass_kg, self.table.as_ref());
+        let mut pressure_pa = self.pressure_kpa * PA_PER_KPA;
+        if pressure_pa != demand_pa {
+            for _ in 0..SUBSTEPS {
+                pressure_pa = self.brake.pressure_step_pa(pressure_pa, demand_pa, SUBSTEP_S);
+            }
+        }
+        self.pressure_kpa = pressure_pa / PA_PER_KPA;
         self.pressure_kpa
     }
 }

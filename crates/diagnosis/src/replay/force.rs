@@ -4,9 +4,16 @@
 
 use std::sync::Arc;
 
-use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S};
+use dynamics::SUBSTEP_S;
+use dynamics::effects::brake::friction_left_frac;
+use dynamics::effects::driveline::with_losses_n;
+use dynamics::effects::resistance::{
+    area_at_yaw_m2, cold_factor, drag_n, grade_n, on_course, rolling_n, side_n,
+};
+use dynamics::effects::table::accel_m_s2;
 
-use super::prepared::{Prepared, at_index};
+use super::brake::PA_PER_KPA;
+use super::prepared::{Prepared, ZERO_DEGC_K, at_index};
 use super::profiles::Kind;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
@@ -61,6 +68,7 @@ pub(crate) struct Inputs {
     speed: Vec<f64>,
     indicated_nm: Vec<f64>,
     friction_nm: Vec<f64>,
+    /// Auxiliaries, with the truck file's own fan.
     auxiliary_nm: Vec<f64>,
     /// Torque per power at the crank, Nm/W.
     per_w: Vec<f64>,
@@ -69,11 +77,17 @@ pub(crate) struct Inputs {
     ratio_1_m: Vec<f64>,
     rotating_kg: Vec<f64>,
     density: Vec<f64>,
-    /// Weight's component into the road per mass, m/s².
-    normal_m_s2: Vec<f64>,
-    sin: Vec<f64>,
+    /// Cosine of the grade.
     cos: Vec<f64>,
-    ambient: Vec<f64>,
+    /// Rolling resistance coefficient of the truck file.
+    rolling_coeff: Vec<f64>,
+    /// Retarder and induced drag of the truck file, N, against the motion.
+    holding_n: Vec<f64>,
+    /// The truck file's fitted tables, m/s².
+    table_m_s2: Vec<f64>,
+    course_sin: Vec<f64>,
+    course_cos: Vec<f64>,
+    air_k: Vec<f64>,
     engine_brake_frac: Vec<f64>,
     xbr: Vec<f64>,
     /// 1 where the driver asks for nothing.
@@ -81,41 +95,80 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
-    pub(super) fn new(d: &Prepared, p: &Plant) -> Self {
-        let r = p.wheel_radius_m;
-        let per_gear: Vec<(f64, f64)> = core::iter::once(0.0)
-            .chain(p.gear_ratios.iter().map(|g| g * p.final_drive_ratio))
-            .map(|i| {
-                let inertia = p.wheel_inertia_kg_m2 + p.engine_inertia_kg_m2 * i * i;
-                (i / r, inertia / (r * r))
+    pub(super) fn new(d: &Prepared, plant: &Plant) -> Self {
+        let (engine, truck) = (&plant.engine, &plant.truck);
+        let driveline = &truck.driveline;
+        let per_gear: Vec<(f64, f64)> = (0..=driveline.gear_ratios.len() as u8)
+            .map(|g| {
+                let rotating_kg = driveline.rotating_mass_kg(truck.engine.inertia_kg_m2, g);
+                (driveline.total_ratio(g) / driveline.wheel_radius_m, rotating_kg)
             })
             .collect();
         let gear = |i: usize| per_gear[if d.gear[i] < per_gear.len() { d.gear[i] } else { 0 }];
-        let omega = |i: usize| (d.rpm[i] / RPM_PER_RAD_S).max(20.0);
+        let (fan, holding) = (file_fan(d, plant), file_holding_n(d, plant));
+        let warmup = -Drive::STEP_S / truck.resistance.tyre_warmup_s;
+        let cold = |i: usize| if d.warm { 0.0 } else { (i as f64 * warmup).exp() };
         let padded = d.n.next_multiple_of(BLOCK);
         let of = |f: &dyn Fn(usize) -> f64| -> Vec<f64> { pad((0..d.n).map(f), padded) };
         Self {
             padded,
             speed: of(&|i| d.speed[i]),
-            indicated_nm: of(&|i| d.torque[i] * 0.01 * p.reference_torque_nm),
-            friction_nm: of(&|i| p.friction_nm[0] + p.friction_nm[1] * d.rpm[i]),
-            auxiliary_nm: of(&|i| p.auxiliary_power_w / omega(i)),
-            per_w: of(&|i| 1.0 / omega(i)),
-            engine_brake_nm: of(&|i| {
-                d.engine_brake[i] * (p.engine_brake_nm[0] + p.engine_brake_nm[1] * d.rpm[i])
-            }),
+            indicated_nm: of(&|i| d.torque[i] * 0.01 * truck.engine.reference_torque_nm),
+            friction_nm: of(&|i| engine.friction_nm(d.omega[i])),
+            auxiliary_nm: of(&|i| engine.auxiliary_nm(d.omega[i], fan[i])),
+            per_w: of(&|i| engine.crank_nm(1.0, d.omega[i])),
+            engine_brake_nm: of(&|i| d.engine_brake[i] * engine.engine_brake_nm(d.omega[i])),
             ratio_1_m: of(&|i| gear(i).0),
             rotating_kg: of(&|i| gear(i).1),
             density: of(&|i| d.density[i]),
-            normal_m_s2: of(&|i| GRAVITY_M_S2 * d.slope[i]),
-            sin: of(&|i| d.course[i].0),
-            cos: of(&|i| d.course[i].1),
-            ambient: of(&|i| d.ambient[i]),
+            cos: of(&|i| d.slope[i]),
+            rolling_coeff: of(&|i| {
+                truck.resistance.rolling_coeff_at(d.speed[i])
+                    * cold_factor(truck.resistance.cold_tyre_extra_frac, cold(i))
+            }),
+            holding_n: pad(holding.into_iter(), padded),
+            table_m_s2: of(&|i| accel_m_s2(&plant.tables, d.speed[i], |s| d.signal(s, i))),
+            course_sin: of(&|i| d.course[i].0),
+            course_cos: of(&|i| d.course[i].1),
+            air_k: of(&|i| d.ambient[i] + ZERO_DEGC_K),
             engine_brake_frac: of(&|i| d.engine_brake[i]),
             xbr: of(&|i| d.xbr[i]),
             coasts: of(&|i| if d.pedal[i] < 0.01 { 1.0 } else { 0.0 }),
         }
     }
+}
+
+/// Whether the truck file's own fan runs, from the measured coolant.
+fn file_fan(d: &Prepared, plant: &Plant) -> Vec<bool> {
+    let mut runs = false;
+    let steps = d.coolant.iter().map(|coolant| {
+        runs = plant.engine.fan_runs(runs, coolant + ZERO_DEGC_K);
+        runs
+    });
+    steps.collect()
+}
+
+/// Force of the truck file's own retarder, from the measured demand and speed, and the drag that
+/// its tyres' side forces induce, from the measured yaw rate, N.
+fn file_holding_n(d: &Prepared, plant: &Plant) -> Vec<f64> {
+    let (driveline, resistance) = (&plant.truck.driveline, &plant.truck.resistance);
+    let loaded = super::lateral::loaded(d, plant, &[0.0; crate::param::PARAMS]);
+    let stiffness: f64 = loaded.tyres.stiffness_n_rad(&loaded.static_axle_load_n()).iter().sum();
+    let substeps = (Drive::STEP_S / SUBSTEP_S).round() as usize;
+    let mut retarder_nm = 0.0;
+    (0..d.n)
+        .map(|i| {
+            let v = d.speed[i];
+            if driveline.retarder_torque_nm > 0.0 {
+                let target_nm = d.engine_brake[i] * driveline.retarder_limit_nm(v);
+                for _ in 0..substeps {
+                    retarder_nm = driveline.retarder_step_nm(retarder_nm, target_nm, SUBSTEP_S);
+                }
+            }
+            driveline.shaft_force_n(retarder_nm + driveline.hidden_retarder_nm(v))
+                + resistance.curve_n(d.mass_kg, v * d.yaw[i], stiffness)
+        })
+        .collect()
 }
 
 /// A signal with its last value held up to `padded` samples.
@@ -160,13 +213,13 @@ pub(crate) struct Longitudinal<'a> {
     rolling: f64,
     cold: f64,
     grade_bias: f64,
-    brake_n_kpa: f64,
-    fade_1_k: f64,
-    fade_start_c: f64,
+    brake: f64,
+    /// Loss of force per kelvin and where it begins, K: the truck file's, and the parameters'.
+    fade: [(f64, f64); 2],
     retarder: [f64; 3],
     parasitic_n: f64,
     grade: Arc<[f64]>,
-    pressure: Arc<[f64]>,
+    service_n: Arc<[f64]>,
     heat: Option<Arc<[f64]>>,
     fan: Option<Arc<[f64]>>,
     cold_left: Option<Arc<[f64]>>,
@@ -175,7 +228,13 @@ pub(crate) struct Longitudinal<'a> {
 impl<'a> Longitudinal<'a> {
     pub(crate) fn new(d: &'a Prepared, plant: &Plant, t: &Theta) -> Self {
         let at = |p: P| t[p as usize];
-        let per_prop = plant.final_drive_ratio / plant.wheel_radius_m;
+        let (driveline, resistance) = (&plant.truck.driveline, &plant.truck.resistance);
+        let per_prop = driveline.shaft_force_n(1.0);
+        let brake = &plant.truck.brake;
+        let fade = [
+            (brake.fade_1_k, brake.fade_from_k),
+            (0.01 * at(P::Fade), 150.0 + ZERO_DEGC_K + at(P::FadeStart)),
+        ];
         Self {
             d: &d.balance,
             mass_kg: d.mass_kg * (1.0 + at(P::Mass)),
@@ -183,25 +242,24 @@ impl<'a> Longitudinal<'a> {
             friction: 1.0 + at(P::Friction),
             engine_brake: 1.0 + at(P::EngineBrakeScale),
             fan_w: 1e3 * at(P::FanPower),
-            efficiency: plant.efficiency_frac * (1.0 - at(P::DrivelineLoss)),
-            cd_a_m2: plant.cd_a_m2 * (1.0 + at(P::Drag)),
-            drag_yaw_1_rad: plant.drag_yaw_frac_per_deg.to_degrees(),
-            wind: Wind::new(t),
-            rolling: plant.rolling_coeff * (1.0 + at(P::Rolling)),
+            efficiency: driveline.efficiency_frac() * (1.0 - at(P::DrivelineLoss)),
+            cd_a_m2: resistance.drag_area_m2 * (1.0 + at(P::Drag)),
+            drag_yaw_1_rad: resistance.drag_yaw_1_rad,
+            wind: Wind::new(plant, t),
+            rolling: 1.0 + at(P::Rolling),
             cold: at(P::WarmupAmp),
             grade_bias: at(P::GradeBias),
-            brake_n_kpa: plant.brake_gain_n_kpa * (1.0 + at(P::BrakeGain)),
-            fade_1_k: 0.01 * at(P::Fade),
-            fade_start_c: 150.0 + at(P::FadeStart),
+            brake: 1.0 + at(P::BrakeGain),
+            fade,
             retarder: [
                 at(P::RetarderStage) * per_prop,
                 at(P::RetarderCoast) * per_prop,
                 at(P::RetarderBrake),
             ],
-            parasitic_n: at(P::DragBrake),
+            parasitic_n: resistance.parasitic_force_n + at(P::DragBrake),
             grade: d.grade_shifted(at(P::MapShift)),
-            pressure: pressure(d, at(P::PressureLag)),
-            heat: (at(P::Fade) != 0.0).then(|| brake_heat(d, plant, t)),
+            service_n: service_n(d, plant, at(P::PressureLag)),
+            heat: fade.iter().any(|f| f.0 != 0.0).then(|| brake_heat(d, plant, t)),
             fan: (at(P::FanPower) != 0.0).then(|| fan(d, t)),
             cold_left: (at(P::WarmupAmp) != 0.0 && !d.warm).then(|| cold_left(d, t)),
         }
@@ -226,39 +284,40 @@ impl<'a> Longitudinal<'a> {
                 net[j] -= self.fan_w * fan[j] * per_w[j];
             }
         }
-        let (eta, back) = (self.efficiency, 1.0 / self.efficiency);
-        let mut force: [f64; L] =
-            lanes(|j| net[j] * ratio[j] * if net[j] > 0.0 { eta } else { back });
+        let mut force: [f64; L] = lanes(|j| with_losses_n(net[j] * ratio[j], self.efficiency));
         let air = self.air(at, v);
-        let mut rolling = [self.rolling; L];
-        if let Some(cold) = &self.cold_left {
-            let cold = cut::<L>(cold, at);
-            for j in 0..L {
-                rolling[j] *= 1.0 + self.cold * cold[j];
-            }
+        let mut cold = [1.0; L];
+        if let Some(left) = &self.cold_left {
+            let left = cut::<L>(left, at);
+            cold = lanes(|j| cold_factor(self.cold, left[j]));
         }
-        let (normal, grade) = (cut::<L>(&d.normal_m_s2, at), cut::<L>(&self.grade, at));
+        let (cos, grade) = (cut::<L>(&d.cos, at), cut::<L>(&self.grade, at));
+        let coeff = cut::<L>(&d.rolling_coeff, at);
         for j in 0..L {
             // The cosine changes by less than 1e-3 of a grade error: the map's counts.
-            let resistance = self.mass_kg * normal[j] * (rolling[j] + (grade[j] + self.grade_bias));
-            force[j] -= air[j] + resistance;
+            force[j] -= air[j]
+                + rolling_n(self.mass_kg, cos[j], coeff[j] * self.rolling, cold[j])
+                + grade_n(self.mass_kg, cos[j] * (grade[j] + self.grade_bias));
         }
-        let pressure = cut::<L>(&self.pressure, at);
-        let mut service: [f64; L] = lanes(|j| self.brake_n_kpa * pressure[j]);
+        let service_n = cut::<L>(&self.service_n, at);
+        let mut service: [f64; L] = lanes(|j| self.brake * service_n[j]);
         if let Some(heat) = &self.heat {
-            let (heat, ambient) = (cut::<L>(heat, at), cut::<L>(&d.ambient, at));
-            for j in 0..L {
-                let over = (heat[j] + ambient[j] - self.fade_start_c).max(0.0);
-                service[j] *= (1.0 - self.fade_1_k * over).max(0.1);
+            let (heat, air_k) = (cut::<L>(heat, at), cut::<L>(&d.air_k, at));
+            for (loss, from) in self.fade {
+                for j in 0..L {
+                    service[j] *= friction_left_frac(loss, heat[j] + air_k[j], from);
+                }
             }
         }
+        let (holding, table) = (cut::<L>(&d.holding_n, at), cut::<L>(&d.table_m_s2, at));
         let (stage, xbr) = (cut::<L>(&d.engine_brake_frac, at), cut::<L>(&d.xbr, at));
         let (coasts, rotating) = (cut::<L>(&d.coasts, at), cut::<L>(&d.rotating_kg, at));
         let [on_stage, on_coast, on_brake] = self.retarder;
         lanes(|j| {
             let coasting = on_coast * coasts[j] * if v[j] > 8.0 { 1.0 } else { 0.0 };
             let retarder = on_stage * stage[j] + coasting + on_brake * xbr[j];
-            (force[j] - service[j] - retarder - self.parasitic_n) / (self.mass_kg + rotating[j])
+            let held = service[j] + retarder + holding[j] + self.parasitic_n;
+            (force[j] - held) / (self.mass_kg + rotating[j]) + table[j]
         })
     }
 
@@ -267,16 +326,15 @@ impl<'a> Longitudinal<'a> {
         let density = cut::<L>(&self.d.density, at);
         let (along, across) = self.wind.over(self.d, at, v);
         if self.wind.still() {
-            return lanes(|j| 0.5 * density[j] * self.cd_a_m2 * along[j].abs() * along[j]);
+            let squared = |j: usize| along[j] * along[j];
+            return lanes(|j| drag_n(density[j], self.cd_a_m2, squared(j), along[j].signum()));
         }
         let tan: [f64; L] = lanes(|j| across[j].abs() / along[j].abs().max(1.0));
         let yaw = arctangents(tan);
         lanes(|j| {
-            0.5 * density[j]
-                * self.cd_a_m2
-                * (1.0 + self.drag_yaw_1_rad * yaw[j])
-                * (along[j] * along[j] + across[j] * across[j]).sqrt()
-                * along[j]
+            let squared = along[j] * along[j] + across[j] * across[j];
+            let area_m2 = area_at_yaw_m2(self.cd_a_m2, self.drag_yaw_1_rad, yaw[j]);
+            drag_n(density[j], area_m2, squared, along[j] / squared.sqrt().max(1e-9))
         })
     }
 }
@@ -289,11 +347,15 @@ struct Wind {
 }
 
 impl Wind {
-    fn new(t: &Theta) -> Self {
+    fn new(plant: &Plant, t: &Theta) -> Self {
+        let file = &plant.truck.resistance;
         Self {
-            head: t[P::Headwind as usize],
-            to_left: t[P::Crosswind as usize],
-            to: [t[P::WindX as usize], t[P::WindY as usize]],
+            head: file.headwind_m_s + t[P::Headwind as usize],
+            to_left: file.crosswind_to_left_m_s + t[P::Crosswind as usize],
+            to: [
+                file.wind_to_x_m_s + t[P::WindX as usize],
+                file.wind_to_y_m_s + t[P::WindY as usize],
+            ],
         }
     }
 
@@ -308,11 +370,11 @@ impl Wind {
         let mut along: [f64; L] = lanes(|j| v[j] + self.head);
         let mut across = [self.to_left; L];
         if self.to != [0.0, 0.0] {
-            let (sin, cos) = (cut::<L>(&d.sin, at), cut::<L>(&d.cos, at));
-            let [x, y] = self.to;
+            let (sin, cos) = (cut::<L>(&d.course_sin, at), cut::<L>(&d.course_cos, at));
             for j in 0..L {
-                along[j] -= x * cos[j] + y * sin[j];
-                across[j] += y * cos[j] - x * sin[j];
+                let (behind, left) = on_course((self.to[0], self.to[1]), (sin[j], cos[j]));
+                along[j] -= behind;
+                across[j] += left;
             }
         }
         (along, across)
@@ -331,8 +393,8 @@ impl<'a> SideForce<'a> {
     pub(super) fn new(d: &'a Prepared, plant: &Plant, t: &Theta) -> Self {
         Self {
             d: &d.balance,
-            wind: Wind::new(t),
-            area_m2_rad: plant.side_area_m2_per_deg.to_degrees(),
+            wind: Wind::new(plant, t),
+            area_m2_rad: plant.truck.resistance.side_force_area_m2_rad,
             speed_scale: 1.0 / (1.0 + t[P::SpeedScale as usize]),
         }
     }
@@ -350,7 +412,7 @@ impl<'a> SideForce<'a> {
         let density = cut::<BLOCK>(&self.d.density, at);
         lanes(|j| {
             let squared = along[j] * along[j] + across[j] * across[j];
-            (0.5 * density[j] * squared * self.area_m2_rad * yaw[j]).copysign(across[j])
+            side_n(density[j], self.area_m2_rad, yaw[j].copysign(across[j]), squared)
         })
     }
 }
@@ -373,26 +435,25 @@ fn arctangents<const L: usize>(x: [f64; L]) -> [f64; L] {
     })
 }
 
-/// Pressure that brakes, later by the lag, kPa.
-fn pressure(d: &Prepared, lag_s: f64) -> Arc<[f64]> {
-    d.profiles.get(Kind::Pressure, [lag_s, 0.0], || {
+/// Force of cold brakes at the pressure that brakes, later by the lag, N.
+fn service_n(d: &Prepared, plant: &Plant, lag_s: f64) -> Arc<[f64]> {
+    d.profiles.get(Kind::Service, [lag_s, 0.0], || {
         let lag = lag_s / Drive::STEP_S;
-        let at = (0..d.n).map(|i| at_index(&d.fine_pressure, i as f64 + lag));
-        pad(at, d.balance.padded)
+        let pressure_pa = |i: usize| PA_PER_KPA * at_index(&d.fine_pressure, i as f64 + lag);
+        let force_n = (0..d.n).map(|i| plant.truck.brake.cold_force_n(1.0, pressure_pa(i)));
+        pad(force_n, d.balance.padded)
     })
 }
 
 /// Heating of the brakes above the air at the measured speed, K.
-fn brake_heat(d: &Prepared, p: &Plant, t: &Theta) -> Arc<[f64]> {
+fn brake_heat(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
     let (lag, speed) = (t[P::PressureLag as usize], t[P::SpeedScale as usize]);
-    let pressure = pressure(d, lag);
+    let service_n = service_n(d, plant, lag);
     d.profiles.get(Kind::BrakeHeat, [lag, speed], || {
         let mut heat_k = 0.0;
-        let steps = d.speed.iter().zip(pressure.iter()).map(|(v, pressure)| {
-            let before = heat_k;
-            let power_w = p.brake_gain_n_kpa * pressure * v / (1.0 + speed);
-            heat_k +=
-                Drive::STEP_S * (power_w / p.brake_heat_capacity_j_k - heat_k / p.brake_cooling_s);
+        let steps = d.speed.iter().zip(service_n.iter()).map(|(v, force_n)| {
+            let (before, power_w) = (heat_k, force_n * v / (1.0 + speed));
+            heat_k = plant.truck.brake.temperature_step_k(heat_k, power_w, 1.0, 0.0, Drive::STEP_S);
             before
         });
         pad(steps, d.balance.padded)

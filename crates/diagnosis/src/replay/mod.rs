@@ -257,3 +257,6 @@ pub(crate) fn replay_group(
         Group::Imu => out[M::Imu as usize] = sensors::imu(d, t),
     }
 }
+
+#[cfg(test)]
+mod tests;

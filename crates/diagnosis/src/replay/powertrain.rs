@@ -1,5 +1,7 @@
 //! Engine torque from pedal and engine speed, shift durations, fuel from torque and speed.
 
+use dynamics::effects::engine::left_frac;
+use dynamics::effects::shift::ShiftPhase;
 use tractrix_core::RPM_PER_RAD_S;
 
 use super::Module as M;
@@ -11,11 +13,12 @@ use crate::{Drive, Plant};
 /// Torque response, percent of the reference torque, mean over two samples.
 pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Torque as usize];
-    let delay = (plant.pedal_delay_s + t[P::PedalDelay as usize]) / Drive::STEP_S;
-    let boost_lag = (plant.torque_lag_s[0] + t[P::TurboLag as usize]).max(0.02);
+    let (engine, file) = (&plant.engine, &plant.truck.engine);
+    let delay = (file.pedal_delay_s + t[P::PedalDelay as usize]) / Drive::STEP_S;
+    let boost_lag = (file.slow_lag_s + t[P::TurboLag as usize]).max(0.02);
     let keep = |lag: f64| (-Drive::STEP_S / lag).exp();
-    let (slow, fast) = (keep(boost_lag), keep(plant.torque_lag_s[1]));
-    let percent = 100.0 / plant.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
+    let (slow, fast) = (keep(boost_lag), keep(file.fast_lag_s));
+    let percent = 100.0 / file.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
     let pedal = d.profiles.get(Kind::Pedal, [delay, 0.0], || {
         (0..d.n).map(|i| at_index(&d.pedal, i as f64 - delay)).collect()
     });
@@ -33,12 +36,10 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 torque = d.torque[i] / percent;
                 running = true;
             }
-            let n = d.rpm[i];
+            let n = d.omega[i];
             let full = d.full_load[i] * if derates { derate(d, t, i) } else { 1.0 };
-            let friction = plant.friction_nm[0] + plant.friction_nm[1] * n;
-            let demand = pedal[i] * (full + friction);
-            let boosting = demand > torque && torque > plant.boost_from_frac * full;
-            let keep = if boosting { slow } else { fast };
+            let demand = engine.governed_nm(engine.pedal_demand_nm(pedal[i], n, full), n, full);
+            let keep = if engine.boosts(torque, demand, full) { slow } else { fast };
             torque = demand + (torque - demand) * keep;
             out[k] += 0.5 * (d.torque[i] - torque.max(0.0) * percent);
         }
@@ -49,25 +50,20 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
 /// Part of the full load that is left at this altitude, air and coolant temperature.
 #[inline]
 fn derate(d: &Prepared, t: &Theta, i: usize) -> f64 {
-    let mut left = 1.0;
-    let loss = |size: P, start: P, from: f64, unit: f64, x: f64| {
-        t[size as usize] * (x - from - t[start as usize]).max(0.0) / unit
+    let left = |size: P, unit: f64, x: f64, from: f64, start: P| {
+        left_frac(t[size as usize] / unit, x, from + t[start as usize])
     };
-    if t[P::Altitude as usize] != 0.0 {
-        left -= loss(P::Altitude, P::AltitudeStart, 1500.0, 1e3, d.altitude[i]);
-    }
-    if t[P::HeatAir as usize] != 0.0 {
-        left -= loss(P::HeatAir, P::HeatAirStart, 30.0, 10.0, d.ambient[i]);
-    }
-    if t[P::HeatCoolant as usize] != 0.0 {
-        left -= loss(P::HeatCoolant, P::HeatCoolantStart, 98.0, 10.0, d.coolant[i]);
-    }
-    left.clamp(0.2, 1.5)
+    let thin = left(P::Altitude, 1e3, d.altitude[i], 1500.0, P::AltitudeStart);
+    let hot = left(P::HeatAir, 10.0, d.ambient[i], 30.0, P::HeatAirStart);
+    let boiling = left(P::HeatCoolant, 10.0, d.coolant[i], 98.0, P::HeatCoolantStart);
+    (thin * hot * boiling).clamp(0.2, 1.5)
 }
 
 /// Measured minus expected duration of every shift, s.
 pub(super) fn shift(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
-    let expected = plant.shift_duration_s + t[P::ShiftTime as usize];
+    let phases = [ShiftPhase::RampDown, ShiftPhase::Open, ShiftPhase::RampUp];
+    let file: f64 = phases.iter().map(|p| plant.truck.shift.phase_length_s(*p)).sum();
+    let expected = file + t[P::ShiftTime as usize];
     d.shifts.iter().map(|s| s.1 as f64 * Drive::STEP_S - expected).collect()
 }
 
@@ -77,16 +73,16 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let lag = t[P::FuelLag as usize] / Drive::STEP_S;
     let torque = |i: usize| {
         let percent = at_index(&d.torque, i as f64 - lag);
-        (percent * 0.01 * plant.reference_torque_nm).max(0.0)
+        // Rows without fuel are masked: what is injected elsewhere burns along the map's line, even
+        // where the message says no torque.
+        (percent * 0.01 * plant.truck.engine.reference_torque_nm).max(1e-9)
     };
-    let rpm = |i: usize| at_index(&d.rpm, i as f64 - lag);
-    let [a, b, c] = plant.fuel;
+    let omega = |i: usize| at_index(&d.rpm, i as f64 - lag) / RPM_PER_RAD_S;
     let rate = d.profiles.get(Kind::Willans, [lag, 0.0], || {
-        let rate = |i| a + b * rpm(i) + c * torque(i) * rpm(i) / RPM_PER_RAD_S * 1e-3;
-        (0..d.n).map(rate).collect()
+        (0..d.n).map(|i| plant.engine.fuel_rate_g_s(omega(i), torque(i))).collect()
     });
     let load = d.profiles.get(Kind::Load, [lag, 0.0], || {
-        (0..d.n).map(|i| torque(i) / plant.full_load_nm.at(rpm(i)).max(1.0)).collect()
+        (0..d.n).map(|i| torque(i) / plant.engine.full_load_nm.at(omega(i)).max(1.0)).collect()
     });
     let (scale, low) = (1.0 + t[P::FuelScale as usize], t[P::FuelLow as usize]);
     let per_load = 1.0 / (0.3 * t[P::FuelLowLoad as usize].exp());

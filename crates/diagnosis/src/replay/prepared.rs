@@ -1,6 +1,8 @@
 //! A drive made ready for replay: channels with defaults, air density, masks per module.
 
-use tractrix_core::{GAS_CONSTANT_AIR_J_KG_K, GRAVITY_M_S2};
+use dynamics::effects::resistance::air_density_kg_m3;
+use dynamics::effects::table::TableSignal;
+use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S};
 
 use super::force::Inputs;
 use super::profiles::Profiles;
@@ -25,6 +27,8 @@ pub(crate) struct Prepared {
     pub(crate) pedal: Vec<f64>,
     pub(crate) torque: Vec<f64>,
     pub(crate) rpm: Vec<f64>,
+    /// Engine speed, rad/s.
+    pub(super) omega: Vec<f64>,
     pub(crate) gear: Vec<usize>,
     pub(crate) engine_brake: Vec<f64>,
     pub(crate) xbr: Vec<f64>,
@@ -43,7 +47,7 @@ pub(crate) struct Prepared {
     pub(crate) curvature: Vec<f64>,
     pub(crate) s_map: Vec<f64>,
     pub(crate) grade_by_s: GradeBySection,
-    /// Full-load torque at the engine speed of every sample, Nm.
+    /// Full-load torque at the engine speed and in the air of every sample, Nm.
     pub(super) full_load: Vec<f64>,
     pub(super) balance: Inputs,
     pub(super) profiles: Profiles,
@@ -98,6 +102,9 @@ impl GradeBySection {
     }
 }
 
+/// Zero of the Celsius scale, K.
+pub(super) const ZERO_DEGC_K: f64 = 273.15;
+
 /// Samples kept away from a shift on either side.
 const SHIFT_MARGIN: usize = 12;
 
@@ -126,9 +133,14 @@ impl Prepared {
         let density = get(C::BaroPressurePa, 101_325.0)
             .iter()
             .zip(&ambient)
-            .map(|(p, t)| p / (GAS_CONSTANT_AIR_J_KG_K * (t + 273.15)))
+            .map(|(p, t)| air_density_kg_m3(*p, t + ZERO_DEGC_K))
             .collect();
-        let rpm = get(C::EngineSpeedRpm, plant.idle_speed_rpm);
+        let rpm = get(C::EngineSpeedRpm, plant.truck.engine.idle_speed_rpm);
+        let omega: Vec<f64> = rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
+        let altitude = get(C::GpsAltitudeM, 0.0);
+        let air = omega.iter().zip(&altitude).zip(&ambient);
+        let full_load =
+            air.map(|((n, h), t)| plant.engine.full_load_at_nm(*n, *h, t + ZERO_DEGC_K)).collect();
         let gear: Vec<usize> = get(C::Gear, 0.0).iter().map(|g| g.max(0.0) as usize).collect();
         let shifting: Vec<bool> = get(C::ShiftInProcess, 0.0).iter().map(|s| *s > 0.5).collect();
         let shifts = runs(&shifting);
@@ -141,7 +153,7 @@ impl Prepared {
             mass_kg: drive.reported_mass_kg.unwrap_or(plant.mass_kg),
             warm: drive.tyres_warm_at_start.unwrap_or(true),
             gps: get(C::GpsSpeedMS, 0.0),
-            altitude: get(C::GpsAltitudeM, 0.0),
+            altitude,
             course: heading.iter().map(|h| h.sin_cos()).collect(),
             slope: grade.iter().map(|g| 1.0 / (1.0 + g * g).sqrt()).collect(),
             heading,
@@ -160,7 +172,8 @@ impl Prepared {
             coolant: get(C::CoolantTempDegc, 80.0),
             curvature: get(C::Curvature1M, 0.0),
             grade_by_s: GradeBySection::new(&s_map, &grade),
-            full_load: rpm.iter().map(|n| plant.full_load_nm.at(*n)).collect(),
+            full_load,
+            omega,
             balance: Inputs::default(),
             profiles: Profiles::default(),
             speed,
@@ -200,6 +213,28 @@ impl Prepared {
         }
     }
 
+    /// What a fitted table of the truck file follows.
+    pub(super) fn signal(&self, signal: TableSignal, i: usize) -> f64 {
+        match signal {
+            TableSignal::EngineSpeedRpm => self.rpm[i],
+            TableSignal::SpeedMS => self.speed[i],
+            TableSignal::Curvature1M => self.curvature[i].abs(),
+            TableSignal::GradeFrac => self.grade[i],
+            TableSignal::AmbientTempDegc => self.ambient[i],
+            TableSignal::CoolantTempDegc => self.coolant[i],
+            TableSignal::AcceleratorPedalFrac => self.pedal[i],
+            TableSignal::BrakePressureKpa => self.pressure[i],
+            TableSignal::GpsAltitudeM => self.altitude[i],
+            TableSignal::Gear => self.gear[i] as f64,
+            TableSignal::EngineTorquePercent => self.torque[i],
+            TableSignal::EngineBrakeFrac => self.engine_brake[i],
+            TableSignal::XbrDecelMS2 => self.xbr[i],
+            TableSignal::YawRateRadS => self.yaw[i],
+            TableSignal::AccelYMS2 => self.accel_y[i],
+            TableSignal::SteeringWheelRad => self.steer[i],
+        }
+    }
+
     pub(crate) fn has(&self, channels: &[C]) -> bool {
         channels.iter().all(|c| self.has.contains(c))
     }
@@ -225,7 +260,7 @@ impl Prepared {
                 seconds(M::Force, &|i| self.engaged[i] && self.speed[i] > 3.0);
         }
         if self.has(&[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm]) {
-            let idle = plant.idle_speed_rpm + 80.0;
+            let idle = plant.truck.engine.idle_speed_rpm + 80.0;
             valid[M::Torque as usize] = rows(M::Torque, &|a, b| {
                 (a..b).all(|i| self.engaged[i] && self.rpm[i] > idle && self.speed[i] > 3.0)
             });
@@ -322,14 +357,9 @@ fn engaged(
     }
     (0..n)
         .map(|i| {
-            let Some(ratio) = gear[i].checked_sub(1).and_then(|g| plant.gear_ratios.get(g)) else {
-                return false;
-            };
-            let expected = speed[i] / plant.wheel_radius_m
-                * ratio
-                * plant.final_drive_ratio
-                * tractrix_core::RPM_PER_RAD_S;
-            !near[i] && (rpm[i] - expected).abs() < 60.0 + 0.08 * expected
+            let in_gear = |g| plant.truck.driveline.engine_speed_rad_s(speed[i], g);
+            let expected = u8::try_from(gear[i]).map_or(0.0, in_gear) * RPM_PER_RAD_S;
+            expected != 0.0 && !near[i] && (rpm[i] - expected).abs() < 60.0 + 0.08 * expected
         })
         .collect()
 }

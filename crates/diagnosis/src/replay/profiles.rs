@@ -7,8 +7,8 @@ use std::sync::{Arc, Mutex};
 /// What a kept signal is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Pressure that brakes, kPa; over the lag.
-    Pressure,
+    /// Force of cold brakes, N; over the lag.
+    Service,
     /// Heating of the brakes above the air, K; over lag and speed scale.
     BrakeHeat,
     /// How far the fan is on, 0 to 1; over start and hysteresis.

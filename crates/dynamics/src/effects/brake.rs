@@ -90,6 +90,13 @@ pub struct BrakeState {
     pub reservoir_frac: f64,
 }
 
+/// Friction left in linings that lose `loss_1_k` per kelvin above `from_k`, 0.1 to 1.
+#[inline]
+#[must_use]
+pub fn friction_left_frac(loss_1_k: f64, temperature_k: f64, from_k: f64) -> f64 {
+    (1.0 - loss_1_k * (temperature_k - from_k).max(0.0)).max(0.1)
+}
+
 impl BrakeParameters {
     pub(crate) fn violations(&self) -> Vec<String> {
         let mut b = Bounds::of("brake");
@@ -111,7 +118,10 @@ impl BrakeParameters {
     }
 
     /// The pressure table at a mass: pressure (Pa) over deceleration (m/s²). `None` without one.
-    pub(crate) fn pressure_table(&self, mass_kg: f64) -> Result<Option<Curve>, CoreError> {
+    ///
+    /// # Errors
+    /// [`CoreError::BadTable`] if the table cannot be used.
+    pub fn pressure_table(&self, mass_kg: f64) -> Result<Option<Curve>, CoreError> {
         let (x, y) = (&self.table_mass_kg, &self.table_decel_m_s2);
         if x.is_empty() && y.is_empty() && self.table_pressure_pa.is_empty() {
             return Ok(None);
@@ -143,13 +153,20 @@ impl BrakeParameters {
     /// Friction left in hot linings, 0 to 1.
     #[must_use]
     pub fn fade_frac(&self, temperature_k: f64) -> f64 {
-        (1.0 - self.fade_1_k * (temperature_k - self.fade_from_k).max(0.0)).max(0.1)
+        friction_left_frac(self.fade_1_k, temperature_k, self.fade_from_k)
     }
 
     /// Braking force of a group, N, positive slows: `share` of K at its pressure, faded.
     #[must_use]
     pub fn force_n(&self, share: f64, pressure_pa: f64, temperature_k: f64) -> f64 {
-        self.gain_n_pa * self.gain_scale_coeff * share * pressure_pa * self.fade_frac(temperature_k)
+        self.cold_force_n(share, pressure_pa) * self.fade_frac(temperature_k)
+    }
+
+    /// The same with linings that do not fade.
+    #[inline]
+    #[must_use]
+    pub fn cold_force_n(&self, share: f64, pressure_pa: f64) -> f64 {
+        self.gain_n_pa * self.gain_scale_coeff * share * pressure_pa
     }
 
     /// Disc temperature after `dt_s` of braking with `power_w` into `share` of the heat capacity, K.

@@ -60,6 +60,13 @@ fn retarder_lag_s() -> f64 {
     0.6
 }
 
+/// Wheel force of a loss-free one, N: losses take from what drives and add to what brakes.
+#[inline]
+#[must_use]
+pub fn with_losses_n(loss_free_n: f64, efficiency_frac: f64) -> f64 {
+    if loss_free_n > 0.0 { loss_free_n * efficiency_frac } else { loss_free_n / efficiency_frac }
+}
+
 impl DrivelineParameters {
     pub(crate) fn violations(&self) -> Vec<String> {
         let mut b = Bounds::of("driveline");
@@ -104,9 +111,8 @@ impl DrivelineParameters {
     /// Wheel force of a crank torque through a gear, N.
     #[must_use]
     pub fn force_n(&self, crank_nm: f64, gear: u8) -> f64 {
-        let eta = self.efficiency_frac();
         let raw = crank_nm * self.total_ratio(gear) / self.wheel_radius_m;
-        if crank_nm > 0.0 { raw * eta } else { raw / eta }
+        with_losses_n(raw, self.efficiency_frac())
     }
 
     /// Engine speed with the clutch closed, rad/s.
@@ -129,6 +135,18 @@ impl DrivelineParameters {
         let shaft_rad_s = speed_m_s.abs() * self.final_drive_ratio / self.wheel_radius_m;
         self.retarder_torque_nm.min(self.retarder_power_w / shaft_rad_s.max(1.0))
             * (shaft_rad_s / 40.0).min(1.0)
+    }
+
+    /// One step of the retarder's torque towards its target, Nm.
+    #[must_use]
+    pub fn retarder_step_nm(&self, torque_nm: f64, target_nm: f64, dt_s: f64) -> f64 {
+        torque_nm + (target_nm - torque_nm) * (dt_s / self.retarder_lag_s).min(1.0)
+    }
+
+    /// Torque of the hidden retarder at a speed, Nm; it fades out at walking pace.
+    #[must_use]
+    pub fn hidden_retarder_nm(&self, speed_m_s: f64) -> f64 {
+        self.hidden_retarder_torque_nm * (speed_m_s / 5.0).clamp(0.0, 1.0)
     }
 
     /// Wheel force of a torque at the propeller shaft, N.

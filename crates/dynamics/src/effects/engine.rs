@@ -201,6 +201,13 @@ impl PedalMap {
     }
 }
 
+/// What is left of full load where a quantity is above a threshold and takes `loss` per unit.
+#[inline]
+#[must_use]
+pub fn left_frac(loss: f64, x: f64, from: f64) -> f64 {
+    (1.0 - loss * (x - from).max(0.0)).max(0.0)
+}
+
 /// The engine with its tables in SI, ready to run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Engine {
@@ -217,8 +224,11 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Builds the tables; the parameters have been checked.
-    pub(crate) fn new(p: EngineParameters) -> Result<Self, tractrix_core::CoreError> {
+    /// Builds the tables of checked parameters.
+    ///
+    /// # Errors
+    /// [`tractrix_core::CoreError::BadTable`] names a table that cannot be used.
+    pub fn new(p: EngineParameters) -> Result<Self, tractrix_core::CoreError> {
         let speed = p.full_load_speed_rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
         Ok(Self {
             full_load_nm: Curve::new("full_load_torque_nm", speed, p.full_load_torque_nm.clone())?,
@@ -230,6 +240,7 @@ impl Engine {
     }
 
     /// Friction torque T_f, Nm, positive.
+    #[inline]
     #[must_use]
     pub fn friction_nm(&self, speed_rad_s: f64) -> f64 {
         let p = &self.parameters;
@@ -241,12 +252,13 @@ impl Engine {
     #[must_use]
     pub fn full_load_at_nm(&self, speed_rad_s: f64, altitude_m: f64, air_k: f64) -> f64 {
         let p = &self.parameters;
-        let thin = p.derate_altitude_1_m * (altitude_m - p.derate_altitude_m).max(0.0);
-        let hot = p.derate_air_1_k * (air_k - p.derate_air_k).max(0.0);
-        self.full_load_nm.at(speed_rad_s) * ((1.0 - thin).max(0.0) * (1.0 - hot).max(0.0))
+        let thin = left_frac(p.derate_altitude_1_m, altitude_m, p.derate_altitude_m);
+        let hot = left_frac(p.derate_air_1_k, air_k, p.derate_air_k);
+        self.full_load_nm.at(speed_rad_s) * (thin * hot)
     }
 
     /// Indicated torque that a pedal demands, Nm.
+    #[inline]
     #[must_use]
     pub fn pedal_demand_nm(&self, pedal_frac: f64, speed_rad_s: f64, full_load_nm: f64) -> f64 {
         match &self.pedal_map_nm {
@@ -255,13 +267,27 @@ impl Engine {
         }
     }
 
+    /// The demand within what the engine can give, under the governor at its highest speed, Nm.
+    #[inline]
+    #[must_use]
+    pub fn governed_nm(&self, demand_nm: f64, speed_rad_s: f64, full_load_nm: f64) -> f64 {
+        let max = self.max_rad_s;
+        let governor = ((max * 1.02 - speed_rad_s) / (max * 0.04)).clamp(0.0, 1.0);
+        demand_nm.min(full_load_nm + self.friction_nm(speed_rad_s)) * governor
+    }
+
+    /// Whether torque on its way from a level to a target waits for the turbocharger.
+    #[inline]
+    #[must_use]
+    pub fn boosts(&self, indicated_nm: f64, target_nm: f64, full_load_nm: f64) -> bool {
+        target_nm > indicated_nm && indicated_nm > self.parameters.lag_threshold_frac * full_load_nm
+    }
+
     /// Lag of the torque on its way from a level to a target, s.
     #[must_use]
     pub fn lag_s(&self, indicated_nm: f64, target_nm: f64, full_load_nm: f64) -> f64 {
         let p = &self.parameters;
-        let boosting =
-            target_nm > indicated_nm && indicated_nm > p.lag_threshold_frac * full_load_nm;
-        if boosting { p.slow_lag_s } else { p.fast_lag_s }
+        if self.boosts(indicated_nm, target_nm, full_load_nm) { p.slow_lag_s } else { p.fast_lag_s }
     }
 
     /// Whether the fan runs at a coolant temperature, given whether it ran before.
@@ -276,7 +302,14 @@ impl Engine {
     pub fn auxiliary_nm(&self, speed_rad_s: f64, fan_runs: bool) -> f64 {
         let p = &self.parameters;
         let fan_w = if fan_runs { p.fan_power_w } else { 0.0 };
-        (p.auxiliary_power_w + fan_w) / speed_rad_s.max(0.5 * self.idle_rad_s)
+        self.crank_nm(p.auxiliary_power_w + fan_w, speed_rad_s)
+    }
+
+    /// Torque that takes a power from the crank, Nm.
+    #[inline]
+    #[must_use]
+    pub fn crank_nm(&self, power_w: f64, speed_rad_s: f64) -> f64 {
+        power_w / speed_rad_s.max(0.5 * self.idle_rad_s)
     }
 
     /// Engine-brake torque at full demand, Nm, positive.

@@ -91,8 +91,7 @@ impl AirFlow {
         let (along, across) = if wind_m_s == (0.0, 0.0) {
             (0.0, 0.0)
         } else {
-            let (sin, cos) = libm::sincos(yaw_rad);
-            (wind_m_s.0 * cos + wind_m_s.1 * sin, wind_m_s.1 * cos - wind_m_s.0 * sin)
+            on_course(wind_m_s, libm::sincos(yaw_rad))
         };
         Self {
             head_m_s: speed_m_s - along + headwind_m_s,
@@ -114,6 +113,57 @@ impl AirFlow {
 #[must_use]
 pub fn air_density_kg_m3(pressure_pa: f64, temperature_k: f64) -> f64 {
     pressure_pa / (GAS_CONSTANT_AIR_J_KG_K * temperature_k)
+}
+
+/// Components of a wind (map frame, blowing towards) along and to the left of a course, m/s, from
+/// the course's sine and cosine.
+#[inline]
+#[must_use]
+pub fn on_course(wind_m_s: (f64, f64), (sin, cos): (f64, f64)) -> (f64, f64) {
+    (wind_m_s.0 * cos + wind_m_s.1 * sin, wind_m_s.1 * cos - wind_m_s.0 * sin)
+}
+
+/// Drag area at an air yaw, m²; `yaw_rad` is its magnitude.
+#[inline]
+#[must_use]
+pub fn area_at_yaw_m2(area_m2: f64, growth_1_rad: f64, yaw_rad: f64) -> f64 {
+    area_m2 * (1.0 + growth_1_rad * yaw_rad)
+}
+
+/// Air drag, N, of a flow whose speed squared is `flow_m2_s2`; `head` is the cosine of its
+/// direction, 1 from ahead.
+#[inline]
+#[must_use]
+pub fn drag_n(density_kg_m3: f64, area_m2: f64, flow_m2_s2: f64, head: f64) -> f64 {
+    0.5 * density_kg_m3 * area_m2 * flow_m2_s2 * head
+}
+
+/// Side force of the air, N, positive to the left.
+#[inline]
+#[must_use]
+pub fn side_n(density_kg_m3: f64, area_m2_rad: f64, yaw_rad: f64, flow_m2_s2: f64) -> f64 {
+    0.5 * density_kg_m3 * area_m2_rad * yaw_rad * flow_m2_s2
+}
+
+/// Rolling resistance, N.
+#[inline]
+#[must_use]
+pub fn rolling_n(mass_kg: f64, cos_grade: f64, coeff: f64, cold: f64) -> f64 {
+    mass_kg * GRAVITY_M_S2 * cos_grade * coeff * cold
+}
+
+/// Factor on the rolling resistance of tyres of which a share is still cold.
+#[inline]
+#[must_use]
+pub fn cold_factor(extra_frac: f64, cold_frac: f64) -> f64 {
+    1.0 + extra_frac * cold_frac
+}
+
+/// Component of the weight along the road, N, positive uphill.
+#[inline]
+#[must_use]
+pub fn grade_n(mass_kg: f64, sin_grade: f64) -> f64 {
+    mass_kg * GRAVITY_M_S2 * sin_grade
 }
 
 impl ResistanceParameters {
@@ -140,9 +190,16 @@ impl ResistanceParameters {
     /// `warmth` runs from 0 (cold) to 1 (warm).
     #[must_use]
     pub fn rolling_n(&self, mass_kg: f64, speed_m_s: f64, cos_grade: f64, warmth: f64) -> f64 {
-        let coeff = self.rolling_coeff + self.rolling_per_speed_s_m * speed_m_s.abs();
-        let cold = 1.0 + self.cold_tyre_extra_frac * (1.0 - warmth);
-        mass_kg * GRAVITY_M_S2 * cos_grade * coeff * cold + self.parasitic_force_n
+        let coeff = self.rolling_coeff_at(speed_m_s);
+        let cold = cold_factor(self.cold_tyre_extra_frac, 1.0 - warmth);
+        rolling_n(mass_kg, cos_grade, coeff, cold) + self.parasitic_force_n
+    }
+
+    /// Rolling resistance coefficient of warm tyres at a speed.
+    #[inline]
+    #[must_use]
+    pub fn rolling_coeff_at(&self, speed_m_s: f64) -> f64 {
+        self.rolling_coeff + self.rolling_per_speed_s_m * speed_m_s.abs()
     }
 
     /// Induced drag, N, of the side force `m a_y` (lateral acceleration, m/s²) on tyres whose
@@ -158,19 +215,16 @@ impl ResistanceParameters {
     pub fn drag_n(&self, air: &AirFlow) -> f64 {
         let beta = air.yaw_rad();
         let cos_beta = if beta == 0.0 { 1.0 } else { libm::cos(beta) };
-        let area = self.drag_area_m2 * (1.0 + self.drag_yaw_1_rad * beta.abs());
-        0.5 * air.density_kg_m3
-            * area
-            * air.squared()
-            * cos_beta
-            * if air.head_m_s < 0.0 { -1.0 } else { 1.0 }
+        let area = area_at_yaw_m2(self.drag_area_m2, self.drag_yaw_1_rad, beta.abs());
+        let head = if air.head_m_s < 0.0 { -cos_beta } else { cos_beta };
+        drag_n(air.density_kg_m3, area, air.squared(), head)
     }
 
     /// Side forces of the wind on (tractor, trailer), N, positive to the left.
     #[must_use]
     pub fn side_n(&self, air: &AirFlow) -> (f64, f64) {
         let total =
-            0.5 * air.density_kg_m3 * self.side_force_area_m2_rad * air.yaw_rad() * air.squared();
+            side_n(air.density_kg_m3, self.side_force_area_m2_rad, air.yaw_rad(), air.squared());
         (total * self.side_force_tractor_frac, total * (1.0 - self.side_force_tractor_frac))
     }
 }

@@ -87,14 +87,18 @@ impl TableEffect {
         b.violations
     }
 
-    pub(crate) fn curve(&self) -> Result<(TableSignal, Curve), CoreError> {
+    /// Acceleration over the signal.
+    ///
+    /// # Errors
+    /// [`CoreError::BadTable`] if the values make no table.
+    pub fn curve(&self) -> Result<(TableSignal, Curve), CoreError> {
         let curve = Curve::new("accel_m_s2", self.signal_values.clone(), self.accel_m_s2.clone())?;
         Ok((self.signal, curve))
     }
 }
 
 /// Sum of tables, m/s², at the signals that `read` gives.
-pub(crate) fn accel_m_s2(
+pub fn accel_m_s2(
     tables: &[(TableSignal, Curve)],
     speed_m_s: f64,
     read: impl Fn(TableSignal) -> f64,

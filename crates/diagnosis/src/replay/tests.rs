@@ -1,0 +1,107 @@
+use dynamics::effects::shift::ShiftPhase;
+use dynamics::{RoadPatch, TruckModel, TruckParameters};
+use tractrix_core::{Command, RPM_PER_RAD_S};
+
+use super::*;
+use crate::Channel as C;
+use crate::Drive;
+
+/// Twelve minutes of a truck: climbs that heat the coolant until the fan runs, descents on the
+/// retarder, curves; recorded without noise.
+fn recorded(truck: &TruckParameters, payload_kg: f64) -> Drive {
+    let model = TruckModel::new(truck.clone(), payload_kg).unwrap();
+    let n = 12 * 60 * 20;
+    let mut s = model.initial_state(0.0, 0.0, 0.0, 18.0);
+    s.tyre_warmth = 1.0;
+    s.coolant_k = 364.0;
+    let channels = [
+        C::SpeedMS,
+        C::EngineSpeedRpm,
+        C::EngineTorquePercent,
+        C::Gear,
+        C::ShiftInProcess,
+        C::EngineBrakeFrac,
+        C::AcceleratorPedalFrac,
+        C::GradeFrac,
+        C::YawRateRadS,
+        C::HeadingRad,
+        C::CoolantTempDegc,
+        C::AmbientTempDegc,
+    ];
+    let mut rows: Vec<Vec<f64>> = vec![Vec::new(); channels.len()];
+    for i in 0..n {
+        let t = i as f64 * Drive::STEP_S;
+        let climbs = t % 180.0 < 120.0;
+        let grade_frac: f64 = if climbs { 0.018 } else { -0.035 };
+        let command = Command {
+            accelerator_pedal_frac: if climbs { 0.95 } else { 0.0 },
+            retarder_frac: if climbs { 0.0 } else { 0.45 },
+            steering_wheel_rad: 0.3 * (t / 4.0).sin(),
+            ..Command::default()
+        };
+        let patch = RoadPatch {
+            grade_rad: grade_frac.atan(),
+            air_temperature_k: 303.15,
+            ..RoadPatch::default()
+        };
+        let values = [
+            s.speed_m_s,
+            s.engine_speed_rad_s * RPM_PER_RAD_S,
+            100.0 * s.engine_torque_nm / truck.engine.reference_torque_nm,
+            f64::from(s.shift.gear),
+            if s.shift.phase == ShiftPhase::Engaged { 0.0 } else { 1.0 },
+            command.retarder_frac,
+            command.accelerator_pedal_frac,
+            grade_frac,
+            s.lateral.yaw_rate_rad_s,
+            s.lateral.yaw_rad,
+            s.coolant_k - 273.15,
+            patch.air_temperature_k - 273.15,
+        ];
+        rows.iter_mut().zip(values).for_each(|(r, v)| r.push(v));
+        s = model.step(&s, &command, &patch, Drive::STEP_S).unwrap();
+    }
+    let mut drive = Drive::new("recorded", 0.0, n);
+    drive.reported_mass_kg = Some(model.mass_kg());
+    drive.tyres_warm_at_start = Some(true);
+    for (c, r) in channels.into_iter().zip(rows) {
+        drive.set(c, r);
+    }
+    drive
+}
+
+/// Root mean square of the force balance's residuals, m/s per second, without the two percent that
+/// demands and shifts just changed in.
+fn balance(drive: &Drive, truck: &TruckParameters) -> f64 {
+    let plant = Plant::of_truck(truck).unwrap();
+    let d = Prepared::new(drive, &plant);
+    let mut out = Residuals::default();
+    replay_group(&d, &plant, &[0.0; PARAMS], Group::Force, &mut out);
+    let valid = &d.valid[M::Force as usize];
+    let rows = out[M::Force as usize].iter().zip(valid).filter(|(_, ok)| **ok);
+    let mut squares: Vec<f64> = rows.map(|(x, _)| x * x).collect();
+    assert!(squares.len() > 300, "{} rows", squares.len());
+    squares.sort_by(f64::total_cmp);
+    squares.truncate(squares.len() * 98 / 100);
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[test]
+fn every_effect_of_the_truck_file_is_in_the_balance() {
+    let truck = TruckParameters::load("sinotruk")
+        .unwrap()
+        .with_parameter("resistance.rolling_per_speed_s_m", 2e-4)
+        .unwrap();
+    let drive = recorded(&truck, 20_000.0);
+    let whole = balance(&drive, &truck);
+    assert!(whole < 2e-3, "{whole} m/s");
+    for path in [
+        "engine.fan_power_w",
+        "driveline.retarder_torque_nm",
+        "resistance.rolling_per_speed_s_m",
+        "resistance.curve_drag_coeff",
+    ] {
+        let without = balance(&drive, &truck.with_parameter(path, 0.0).unwrap());
+        assert!(without > 2.0 * whole, "{path}: {without} m/s, with it {whole} m/s");
+    }
+}
