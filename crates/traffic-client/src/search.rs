@@ -82,7 +82,7 @@ mod tests {
         let cost = |x: &[f64; 2]| {
             Ok::<f64, ()>((1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2))
         };
-        let found = minimum(&[(-2.0, 2.0), (-1.0, 3.0)], &[-1.0, 2.0], 150, 7, &cost).unwrap();
+        let found = minimum(&[(-2.0, 2.0), (-1.0, 3.0)], &[-1.0, 2.0], 150, 7, cost).unwrap();
         assert!(
             cost(&found.best).unwrap() < 1e-4 && (found.best[0] - 1.0).abs() < 0.03,
             "{:?}",
