@@ -16,7 +16,6 @@ import multiprocessing as mp
 import os
 import random
 import subprocess
-import sys
 import tempfile
 import time
 import xml.etree.ElementTree as xml
@@ -142,7 +141,15 @@ def main() -> None:
         "| processor: alone | full: SUMO | full: client | libsumo full |"
     )
     print("|---" * 15 + "|")
-    cases = ["floor", "step", "context", "full", "native", "libsumo step", "libsumo full"]
+    cases = [
+        "floor",
+        "step",
+        "context",
+        "full",
+        "native",
+        "libsumo step",
+        "libsumo full",
+    ]
     for vehicles in given.vehicles:
         best: dict[tuple[str, str], float] = {}
         with tempfile.TemporaryDirectory() as folder:
