@@ -48,7 +48,7 @@ pub use finding::{Action, Finding, FindingKind};
 pub use hypothesis::CauseKind;
 pub use overlay::{Extension, extend};
 pub use plant::Plant;
-pub use read::{RawTable, read_drives, read_table};
+pub use read::{RawTable, read_drives, read_drives_with, read_table};
 pub use replay::Module;
 pub use report_models::Models;
 pub use table_trial::{TableTrial, try_table};

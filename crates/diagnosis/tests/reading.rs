@@ -4,7 +4,9 @@
 
 use std::path::Path;
 
-use diagnosis::{Action, Channel, DiagnosisError, DriveSet, FindingKind, read_drives};
+use diagnosis::{
+    Action, Channel, DiagnosisError, DriveSet, Executor, FindingKind, read_drives, read_drives_with,
+};
 
 fn folder(rows: impl Iterator<Item = (f64, f64, String)>) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
@@ -97,4 +99,31 @@ fn a_receiver_whose_clock_is_late_is_reported_with_its_lag() {
         _ => None,
     });
     assert!((lag.unwrap() - 2.4).abs() < 0.05, "{found:?}");
+}
+
+/// An executor that does the last job first.
+struct Backwards;
+
+impl Executor for Backwards {
+    fn run(&self, count: usize, job: &(dyn Fn(usize) + Sync)) {
+        (0..count).rev().for_each(job);
+    }
+}
+
+#[test]
+fn drives_come_in_the_order_of_the_index_however_they_are_read() {
+    let pedal = |i: usize| if i.is_multiple_of(7) { "NaN".to_owned() } else { "0.4".to_owned() };
+    let dir = folder((0..2400).map(|i| (i as f64 * 0.05, speed(i as f64 * 0.05), pedal(i))));
+    let index = |files: [&str; 3]| {
+        let entry = |(i, f): (usize, &str)| format!("[[drive]]\nname = \"d{i}\"\nfile = {f:?}\n");
+        let drives: String = files.into_iter().enumerate().map(entry).collect();
+        write(dir.path(), "drives.toml", &format!("schema = 1\ntruck = \"reference\"\n{drives}"));
+    };
+    index(["d.csv", "d.csv", "d.csv"]);
+    let forwards = read_drives(dir.path()).unwrap();
+    assert!(!forwards.findings.is_empty());
+    assert_eq!(read_drives_with(dir.path(), &Backwards).unwrap(), forwards);
+    index(["d.csv", "second.csv", "third.csv"]);
+    let error = read_drives_with(dir.path(), &Backwards).unwrap_err().to_string();
+    assert!(error.contains("second.csv"), "{error}");
 }

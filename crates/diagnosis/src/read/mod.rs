@@ -5,11 +5,12 @@ mod grid;
 mod parquet_table;
 
 use std::path::Path;
+use std::sync::Mutex;
 
 use serde::Deserialize;
 
 use crate::drive::RoadMap;
-use crate::{DiagnosisError, DriveSet};
+use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial};
 
 /// Columns of one file by name, as written, `NaN` where a value is missing.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -54,6 +55,14 @@ struct Entry {
 /// A file that cannot be read or decoded, an index of another form, a drive without usable
 /// `time_s` or `speed_m_s`, with shuffled rows, or shorter than a minute.
 pub fn read_drives(dir: &Path) -> Result<DriveSet, DiagnosisError> {
+    read_drives_with(dir, &Serial)
+}
+
+/// The same, drives side by side on an executor; the result does not depend on it.
+///
+/// # Errors
+/// As [`read_drives`]; of several drives that cannot be read the first in the index is named.
+pub fn read_drives_with(dir: &Path, executor: &dyn Executor) -> Result<DriveSet, DiagnosisError> {
     let path = dir.join("drives.toml");
     let text = std::fs::read_to_string(&path)
         .map_err(|e| DiagnosisError::Io { path: path.clone(), why: e.to_string() })?;
@@ -65,28 +74,51 @@ pub fn read_drives(dir: &Path) -> Result<DriveSet, DiagnosisError> {
     if index.drive.is_empty() {
         return Err(bad("no [[drive]] in it".into()));
     }
-    let mut set = DriveSet { truck: index.truck, drives: Vec::new(), findings: Vec::new() };
-    for entry in &index.drive {
-        if set.drives.iter().any(|d| d.name == entry.name) {
+    for (i, entry) in index.drive.iter().enumerate() {
+        if index.drive[..i].iter().any(|d| d.name == entry.name) {
             return Err(bad(format!("two drives are named {:?}", entry.name)));
         }
-        let table = read_table(&dir.join(&entry.file))?;
-        let mut drive = grid::to_grid(&entry.name, &table, &mut set.findings)?;
-        if let Some(m) = entry.reported_mass_kg {
-            if !(1000.0..=200_000.0).contains(&m) {
-                return Err(bad(format!("drive {}: reported_mass_kg = {m}", entry.name)));
-            }
-            drive.reported_mass_kg = Some(m);
+    }
+    type One = Result<(Drive, Vec<Finding>), DiagnosisError>;
+    let slots: Vec<Mutex<Option<One>>> = index.drive.iter().map(|_| Mutex::new(None)).collect();
+    executor.run(slots.len(), &|i| {
+        let one = read_drive(dir, &index.drive[i], &bad);
+        if let Ok(mut slot) = slots[i].lock() {
+            *slot = Some(one);
         }
-        drive.tyres_warm_at_start = entry.tyres_warm_at_start;
-        if let Some(map) = &entry.map {
-            drive.map = Some(road_map(&dir.join(map))?);
-            grid::fill_from_map(&mut drive);
-        }
-        crate::clock::check(&drive, &mut set.findings);
+    });
+    let mut set = DriveSet { truck: index.truck, drives: Vec::new(), findings: Vec::new() };
+    for slot in slots {
+        let lost = || DiagnosisError::Numerics("a drive was lost while reading".into());
+        let (drive, findings) = slot.into_inner().ok().flatten().ok_or_else(lost)??;
         set.drives.push(drive);
+        set.findings.extend(findings);
     }
     Ok(set)
+}
+
+/// One drive of the index and what was found in it.
+fn read_drive(
+    dir: &Path,
+    entry: &Entry,
+    bad: &(dyn Fn(String) -> DiagnosisError + Sync),
+) -> Result<(Drive, Vec<Finding>), DiagnosisError> {
+    let mut findings = Vec::new();
+    let table = read_table(&dir.join(&entry.file))?;
+    let mut drive = grid::to_grid(&entry.name, &table, &mut findings)?;
+    if let Some(m) = entry.reported_mass_kg {
+        if !(1000.0..=200_000.0).contains(&m) {
+            return Err(bad(format!("drive {}: reported_mass_kg = {m}", entry.name)));
+        }
+        drive.reported_mass_kg = Some(m);
+    }
+    drive.tyres_warm_at_start = entry.tyres_warm_at_start;
+    if let Some(map) = &entry.map {
+        drive.map = Some(road_map(&dir.join(map))?);
+        grid::fill_from_map(&mut drive);
+    }
+    crate::clock::check(&drive, &mut findings);
+    Ok((drive, findings))
 }
 
 /// Reads one table, CSV if the name ends in `.csv`, else Parquet.

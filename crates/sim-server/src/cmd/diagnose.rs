@@ -140,7 +140,7 @@ pub(crate) fn read(
         folder::write(made, &truck.name, &tables?)?;
         made
     };
-    diagnosis::read_drives(folder).map_err(Failure::input)
+    diagnosis::read_drives_with(folder, &Threads::available()).map_err(Failure::input)
 }
 
 /// Writes a file of the results.
