@@ -37,5 +37,7 @@ pub use time::Time;
 
 /// Standard gravity, m/s² (ISO 80000-3).
 pub const GRAVITY_M_S2: f64 = 9.806_65;
+/// 0 °C in K (SI brochure).
+pub const ZERO_DEGC_K: f64 = 273.15;
 /// Specific gas constant of dry air, J/(kg K).
 pub const GAS_CONSTANT_AIR_J_KG_K: f64 = 287.05;

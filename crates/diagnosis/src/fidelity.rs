@@ -13,7 +13,7 @@
 
 use dynamics::{RoadPatch, TruckModel, TruckParameters, TruckState};
 use serde::Serialize;
-use tractrix_core::{BrakeMode, Command, GearRequest, RPM_PER_RAD_S};
+use tractrix_core::{BrakeMode, Command, GearRequest, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use crate::{Channel as C, DiagnosisError, Drive};
 
@@ -21,9 +21,6 @@ use crate::{Channel as C, DiagnosisError, Drive};
 pub const HORIZONS_S: [f64; 4] = [1.0, 10.0, 30.0, 60.0];
 /// Time over which delay lines fill before a free run starts, s.
 const LEAD_S: f64 = 1.0;
-/// 0 °C in K.
-const ZERO_DEGC_K: f64 = 273.15;
-
 /// How well one signal is reproduced.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SignalFidelity {

@@ -43,7 +43,7 @@ pub use diagnosis::{
 };
 pub use drive::{Drive, DriveSet, RoadMap};
 pub use error::DiagnosisError;
-pub use executor::{Executor, Serial};
+pub use executor::{Executor, Serial, collect};
 pub use finding::{Action, Finding, FindingKind};
 pub use hypothesis::CauseKind;
 pub use overlay::{Extension, extend};

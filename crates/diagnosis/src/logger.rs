@@ -7,13 +7,10 @@
 use dynamics::{RoadPatch, TruckModel};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use tractrix_core::{BrakeMode, Command, EgoState, GRAVITY_M_S2, RPM_PER_RAD_S};
+use tractrix_core::{BrakeMode, Command, EgoState, GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use crate::Channel;
 use crate::channel::CHANNELS;
-
-/// 0 °C in K.
-const ZERO_DEGC_K: f64 = 273.15;
 
 /// Seeded random numbers.
 #[derive(Debug, Clone)]

@@ -12,7 +12,7 @@
 use std::collections::BTreeMap;
 
 use dynamics::{Overlay, OverlayValue, TruckParameters};
-use tractrix_core::RPM_PER_RAD_S;
+use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use crate::{Cause, NotObservable};
 
@@ -25,8 +25,6 @@ pub struct Extension {
     pub not_carried: Vec<NotObservable>,
 }
 
-/// 0 °C in K.
-const ZERO_DEGC_K: f64 = 273.15;
 /// Thresholds and time constants from which the replay counts its shape parameters.
 const FAN_FROM_DEGC: f64 = 97.0;
 const FADE_FROM_DEGC: f64 = 150.0;

@@ -9,11 +9,11 @@ use dynamics::effects::table::{TableEffect, TableSignal};
 use serde::Serialize;
 
 use crate::diagnosis::split;
-use crate::fidelity::{DriveFidelity, HORIZONS_S, fidelity};
+use crate::fidelity::{HORIZONS_S, fidelity};
 use crate::replay::Module;
 use crate::{
     BeforeAfter, Channel, Diagnosis, DiagnosisError, Drive, DriveSet, Executor, Options, Unknown,
-    extend,
+    collect, extend,
 };
 
 /// A table and what came of it.
@@ -101,19 +101,10 @@ fn errors(
     drives: &[&Drive],
     executor: &dyn Executor,
 ) -> Result<Vec<[f64; 2]>, DiagnosisError> {
-    type Slot = std::sync::Mutex<Option<Result<DriveFidelity, DiagnosisError>>>;
-    let slots: Vec<Slot> = drives.iter().map(|_| Slot::default()).collect();
-    executor.run(drives.len(), &|i| {
-        let one = fidelity(truck, drives[i]);
-        if let Ok(mut slot) = slots[i].lock() {
-            *slot = Some(one);
-        }
-    });
-    let lost = || DiagnosisError::Numerics("a drive was lost".into());
     let longest = HORIZONS_S.last().copied();
-    let mut out = Vec::with_capacity(slots.len());
-    for slot in slots {
-        let one = slot.into_inner().ok().flatten().ok_or_else(lost)??;
+    let mut out = Vec::with_capacity(drives.len());
+    for one in collect(executor, drives.len(), |i| fidelity(truck, drives[i])) {
+        let one = one?;
         let speed = one
             .signals
             .iter()

@@ -9,7 +9,9 @@
 //! often it is called. At standstill brakes and rolling resistance hold the truck up to what they
 //! can, and no force moves it through zero backwards other than the grade and the driveline.
 
-use tractrix_core::{BrakeMode, Command, Curve, GRAVITY_M_S2, GearRequest, RPM_PER_RAD_S};
+use tractrix_core::{
+    BrakeMode, Command, Curve, GRAVITY_M_S2, GearRequest, RPM_PER_RAD_S, ZERO_DEGC_K,
+};
 
 use crate::effects::brake::GROUPS;
 use crate::effects::engine::Engine;
@@ -24,8 +26,6 @@ use crate::{DynamicsError, TruckParameters};
 const GROUP_AXLES: [core::ops::Range<usize>; GROUPS] = [0..1, 1..3, 3..6];
 /// Speed below which static friction decides, m/s.
 const STANDSTILL_M_S: f64 = 1e-3;
-/// 0 °C in K.
-const ZERO_DEGC_K: f64 = 273.15;
 /// Coolant: time constant, s, rise per indicated power, K/W, level at no load above air, K.
 const COOLANT: (f64, f64, f64) = (240.0, 9.0e-5, 60.0);
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use dynamics::effects::resistance::air_above;
 use dynamics::{DynamicsError, RoadPatch, SUBSTEP_S, TruckModel, TruckState};
 use road::{LaneKind, Road};
 use tractrix_core::{Command, EgoState, Stamped, Time, Vehicle, VehicleLimits};
@@ -22,19 +23,11 @@ pub struct SimTruck {
     time: Time,
 }
 
-/// Relative fall of the standard atmosphere's pressure with altitude near sea level, 1/m (ISO 2533).
-const PRESSURE_LAPSE_1_M: f64 = 1.2e-4;
-/// Fall of the standard atmosphere's temperature, K/m (ISO 2533).
-const TEMPERATURE_LAPSE_K_M: f64 = 6.5e-3;
-
 impl Weather {
     /// Temperature, K, and pressure, Pa, of the air so many metres above the start of the road.
     #[must_use]
     pub fn air_at(&self, climbed_m: f64) -> (f64, f64) {
-        (
-            self.air_temperature_k - TEMPERATURE_LAPSE_K_M * climbed_m,
-            self.air_pressure_pa * (1.0 - PRESSURE_LAPSE_1_M * climbed_m),
-        )
+        air_above((self.air_temperature_k, self.air_pressure_pa), climbed_m)
     }
 }
 

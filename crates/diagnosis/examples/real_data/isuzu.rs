@@ -12,7 +12,7 @@ use diagnosis::coast_down::{CoastDown, Driven, Priors, fit, place};
 use diagnosis::fit::Estimate;
 use dynamics::TruckParameters;
 use dynamics::effects::resistance::air_density_kg_m3;
-use tractrix_core::RPM_PER_RAD_S;
+use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use crate::plot::{Panel, Series, write};
 use crate::table::{column, files, read};
@@ -157,7 +157,7 @@ fn driving(
         let (torque, rpm) = (take("EngPercentTorque_ACT[%]")?, take("EngSpeed[RPM]")?);
         let (altitude, pedal) =
             (take("gps_Altitude[m]")?, take("Accelerator_Pedal_Position_D[%]")?);
-        let kelvin = take("Ambient_Air_Temperature[ºC]")?[0] + 273.15;
+        let kelvin = take("Ambient_Air_Temperature[ºC]")?[0] + ZERO_DEGC_K;
         density = air_density_kg_m3(1000.0 * take("Barometric_Pressure[kPa]")?[0], kelvin);
         let step_s = (t[t.len() - 1] - t[0]) / (t.len() - 1) as f64;
         let n = (WINDOW_S / step_s).round() as usize;

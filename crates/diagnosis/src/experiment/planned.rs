@@ -1,7 +1,8 @@
 //! A planned drive, driven in the truck model and logged.
 
+use dynamics::effects::resistance::air_above;
 use dynamics::{RoadPatch, TruckModel, TruckParameters};
-use tractrix_core::{BrakeMode, Command};
+use tractrix_core::{BrakeMode, Command, ZERO_DEGC_K};
 
 use super::manoeuvre::{Foot, Plan, Until};
 use crate::channel::CHANNELS;
@@ -16,9 +17,8 @@ const CONTROL_S: f64 = 0.01;
 const DRIVER: (f64, f64) = (0.4, 0.05);
 /// How fast the pedal moves, 1/s.
 const FOOT_RATE_1_S: f64 = 2.5;
-/// Scale height of the atmosphere, m.
-const SCALE_HEIGHT_M: f64 = 8434.0;
-const ZERO_DEGC_K: f64 = 273.15;
+/// Air of the standard atmosphere at sea level, K and Pa (ISO 2533).
+const SEA_LEVEL: (f64, f64) = (288.15, 101_325.0);
 
 /// Drives a plan with the truck of the truck file, as a logger has it.
 pub(super) fn drive(
@@ -85,7 +85,7 @@ pub(super) fn drive(
                 grade_rad: grade_frac.atan(),
                 altitude_m,
                 air_temperature_k: plan.air_degc + ZERO_DEGC_K,
-                air_pressure_pa: 101_325.0 * (-altitude_m / SCALE_HEIGHT_M).exp(),
+                air_pressure_pa: air_above(SEA_LEVEL, altitude_m).1,
                 ..RoadPatch::default()
             };
             if control.is_multiple_of((Drive::STEP_S / CONTROL_S).round() as u64) {

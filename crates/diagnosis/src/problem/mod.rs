@@ -23,7 +23,7 @@ use nalgebra::DMatrix;
 use crate::param::{P, PARAMS, SPECS, Theta};
 use crate::replay::{GROUPS, MODULES, Prepared, Residuals, replay_group};
 use crate::stats::whiten::Whitener;
-use crate::{DiagnosisError, Executor, Plant};
+use crate::{DiagnosisError, Executor, Plant, collect};
 
 /// Tolerances, calibration and noise of a truck and its logger.
 #[derive(Debug, Clone)]
@@ -84,17 +84,7 @@ impl<'a> Problem<'a> {
         let theta = [0.0; PARAMS];
         let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
         let reference = Reference::start(&drives, &residuals, theta, clean);
-        let kept = drives.iter().map(|_| Kept::default()).collect();
-        let mut problem = Self {
-            plant,
-            drives,
-            reference,
-            nuisance: Vec::new(),
-            common: Arc::default(),
-            kept,
-            executor,
-        };
-        problem.rebuild(Changed::Everything)?;
+        let mut problem = Self::with(plant, drives, reference, executor)?;
         for round in 0..2 {
             if clean || round > 0 {
                 problem.calibrate(clean, round == 0)?;
@@ -158,15 +148,7 @@ impl<'a> Problem<'a> {
 
     /// Runs `f` for every drive, by the executor.
     pub(crate) fn each<T: Send>(&self, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
-        let slots: Vec<std::sync::Mutex<Option<T>>> =
-            self.drives.iter().map(|_| std::sync::Mutex::new(None)).collect();
-        self.executor.run(self.drives.len(), &|i| {
-            let value = f(i);
-            if let Ok(mut slot) = slots[i].lock() {
-                *slot = Some(value);
-            }
-        });
-        slots.into_iter().filter_map(|s| s.into_inner().ok().flatten()).collect()
+        collect(self.executor, self.drives.len(), f)
     }
 
     /// Whitened residuals of drive `i` at `theta`.

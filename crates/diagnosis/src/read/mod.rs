@@ -5,12 +5,11 @@ mod grid;
 mod parquet_table;
 
 use std::path::Path;
-use std::sync::Mutex;
 
 use serde::Deserialize;
 
 use crate::drive::RoadMap;
-use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial};
+use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial, collect};
 
 /// Columns of one file by name, as written, `NaN` where a value is missing.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -79,18 +78,9 @@ pub fn read_drives_with(dir: &Path, executor: &dyn Executor) -> Result<DriveSet,
             return Err(bad(format!("two drives are named {:?}", entry.name)));
         }
     }
-    type One = Result<(Drive, Vec<Finding>), DiagnosisError>;
-    let slots: Vec<Mutex<Option<One>>> = index.drive.iter().map(|_| Mutex::new(None)).collect();
-    executor.run(slots.len(), &|i| {
-        let one = read_drive(dir, &index.drive[i], &bad);
-        if let Ok(mut slot) = slots[i].lock() {
-            *slot = Some(one);
-        }
-    });
     let mut set = DriveSet { truck: index.truck, drives: Vec::new(), findings: Vec::new() };
-    for slot in slots {
-        let lost = || DiagnosisError::Numerics("a drive was lost while reading".into());
-        let (drive, findings) = slot.into_inner().ok().flatten().ok_or_else(lost)??;
+    for one in collect(executor, index.drive.len(), |i| read_drive(dir, &index.drive[i], &bad)) {
+        let (drive, findings) = one?;
         set.drives.push(drive);
         set.findings.extend(findings);
     }

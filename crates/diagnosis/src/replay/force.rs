@@ -11,9 +11,10 @@ use dynamics::effects::resistance::{
     area_at_yaw_m2, cold_factor, drag_n, grade_n, on_course, rolling_n, side_n,
 };
 use dynamics::effects::table::accel_m_s2;
+use tractrix_core::ZERO_DEGC_K;
 
 use super::brake::PA_PER_KPA;
-use super::prepared::{Prepared, ZERO_DEGC_K, at_index};
+use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};

@@ -2,7 +2,7 @@
 
 use dynamics::effects::resistance::air_density_kg_m3;
 use dynamics::effects::table::TableSignal;
-use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S};
+use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::force::Inputs;
 use super::profiles::Profiles;
@@ -101,9 +101,6 @@ impl GradeBySection {
         self.values[i] + (x - i as f64).min(1.0) * (self.values[j] - self.values[i])
     }
 }
-
-/// Zero of the Celsius scale, K.
-pub(super) const ZERO_DEGC_K: f64 = 273.15;
 
 /// Samples kept away from a shift on either side.
 const SHIFT_MARGIN: usize = 12;

@@ -1,6 +1,6 @@
 use dynamics::effects::shift::ShiftPhase;
 use dynamics::{RoadPatch, TruckModel, TruckParameters};
-use tractrix_core::{Command, RPM_PER_RAD_S};
+use tractrix_core::{Command, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::*;
 use crate::Channel as C;
@@ -55,8 +55,8 @@ fn recorded(truck: &TruckParameters, payload_kg: f64) -> Drive {
             grade_frac,
             s.lateral.yaw_rate_rad_s,
             s.lateral.yaw_rad,
-            s.coolant_k - 273.15,
-            patch.air_temperature_k - 273.15,
+            s.coolant_k - ZERO_DEGC_K,
+            patch.air_temperature_k - ZERO_DEGC_K,
         ];
         rows.iter_mut().zip(values).for_each(|(r, v)| r.push(v));
         s = model.step(&s, &command, &patch, Drive::STEP_S).unwrap();

@@ -115,6 +115,20 @@ pub fn air_density_kg_m3(pressure_pa: f64, temperature_k: f64) -> f64 {
     pressure_pa / (GAS_CONSTANT_AIR_J_KG_K * temperature_k)
 }
 
+/// Fall of the standard atmosphere's temperature with altitude, K/m (ISO 2533).
+const TEMPERATURE_LAPSE_K_M: f64 = 6.5e-3;
+/// Least ratio of temperatures that a climb can lead to: no road reaches it.
+const LEAST_RATIO: f64 = 0.5;
+
+/// Temperature, K, and pressure, Pa, of air `climbed_m` above where they are `(temperature_k,
+/// pressure_pa)`: the layer of constant lapse of the standard atmosphere (ISO 2533, equation 12).
+#[must_use]
+pub fn air_above((temperature_k, pressure_pa): (f64, f64), climbed_m: f64) -> (f64, f64) {
+    let ratio = (1.0 - TEMPERATURE_LAPSE_K_M * climbed_m / temperature_k).max(LEAST_RATIO);
+    let exponent = GRAVITY_M_S2 / (GAS_CONSTANT_AIR_J_KG_K * TEMPERATURE_LAPSE_K_M);
+    (temperature_k * ratio, pressure_pa * libm::pow(ratio, exponent))
+}
+
 /// Components of a wind (map frame, blowing towards) along and to the left of a course, m/s, from
 /// the course's sine and cosine.
 #[inline]
@@ -226,5 +240,25 @@ impl ResistanceParameters {
         let total =
             side_n(air.density_kg_m3, self.side_force_area_m2_rad, air.yaw_rad(), air.squared());
         (total * self.side_force_tractor_frac, total * (1.0 - self.side_force_tractor_frac))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Table of ISO 2533: 275.15 K and 79,495 Pa at 2 km, 255.65 K and 54,020 Pa at 5 km.
+    #[test]
+    fn air_above_sea_level_is_the_standard_atmosphere() {
+        for (climbed_m, temperature_k, pressure_pa) in
+            [(0.0, 288.15, 101_325.0), (2000.0, 275.15, 79_495.0), (5000.0, 255.65, 54_020.0)]
+        {
+            let (t, p) = air_above((288.15, 101_325.0), climbed_m);
+            assert!((t - temperature_k).abs() < 1e-9, "{t} K at {climbed_m} m");
+            assert!((p - pressure_pa).abs() < 5.0, "{p} Pa at {climbed_m} m");
+        }
+        let (start, end) = ((283.0, 97_000.0), air_above((283.0, 97_000.0), 800.0));
+        let back = air_above(end, -800.0);
+        assert!((back.0 - start.0).abs() < 1e-9 && (back.1 - start.1).abs() < 1e-6);
     }
 }

@@ -1,10 +1,9 @@
 //! `replay`: measured inputs through the whole truck model, open loop, and how well it fits.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
 
 use clap::Parser;
-use diagnosis::Executor;
+use diagnosis::collect;
 use diagnosis::fidelity::{DriveFidelity, Replayed, SignalFidelity, fidelity};
 use dynamics::TruckParameters;
 use serde::Serialize;
@@ -52,20 +51,11 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let set = read(&args.drives, &truck, &args.out.join("drives"), 1)?;
     let stages = Stages::start();
     stages.show("replaying the drives");
-    let slots: Vec<Mutex<Option<Result<DriveFidelity, Failure>>>> =
-        set.drives.iter().map(|_| Mutex::new(None)).collect();
-    Threads::available().run(slots.len(), &|i| {
-        let one = fidelity(&truck, &set.drives[i]).map_err(Failure::input);
-        if let Ok(mut slot) = slots[i].lock() {
-            *slot = Some(one);
-        }
-    });
+    let drives =
+        collect(&Threads::available(), set.drives.len(), |i| fidelity(&truck, &set.drives[i]));
     stages.finish();
-    let mut drives = Vec::with_capacity(slots.len());
-    for slot in slots {
-        let one = slot.into_inner().ok().flatten();
-        drives.push(one.unwrap_or_else(|| Err(Failure::Work("a drive was lost".into())))?);
-    }
+    let drives: Vec<DriveFidelity> =
+        drives.into_iter().collect::<Result<_, _>>().map_err(Failure::input)?;
     let overall = overall(&drives);
     let text = sentence(&overall);
     let json = FidelityJson {

@@ -6,9 +6,9 @@
 //! diagnosis sees the drives only; `hidden.json` holds the answer.
 
 use std::path::Path;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-use diagnosis::Executor;
+use diagnosis::collect;
 use diagnosis::logger::Draw;
 use dynamics::catalogue::{Cause, Estimate, cause};
 use dynamics::{Overlay, TruckModel, TruckParameters};
@@ -68,22 +68,13 @@ pub(super) fn measure(out: &Path, seed: u64, threads: &Threads) -> Result<Hidden
     let hidden = hide(&truck, seed)?;
     let scenario = Scenario::builtin("highway").map_err(Failure::work)?;
     let road = Arc::new(Road::load(&scenario.road).map_err(Failure::work)?);
-    let slots: Vec<Mutex<Option<Result<folder::Table, Failure>>>> =
-        (0..DRIVES + CLEAN_DRIVES).map(|_| Mutex::new(None)).collect();
-    threads.run(slots.len(), &|i| {
+    let tables = collect(threads, DRIVES + CLEAN_DRIVES, |i| {
         let clean = i >= DRIVES;
         let of = if clean { &truck } else { &hidden.truck };
         let name = if clean { format!("clean_{}", i - DRIVES) } else { format!("drive_{i}") };
-        let measured = one_drive(name, &scenario, &road, of, seed, i as u64);
-        if let Ok(mut slot) = slots[i].lock() {
-            *slot = Some(measured);
-        }
+        one_drive(name, &scenario, &road, of, seed, i as u64)
     });
-    let mut tables = Vec::with_capacity(slots.len());
-    for slot in slots {
-        let measured = slot.into_inner().ok().flatten();
-        tables.push(measured.unwrap_or_else(|| Err(Failure::Work("a drive was lost".into())))?);
-    }
+    let mut tables: Vec<folder::Table> = tables.into_iter().collect::<Result<_, _>>()?;
     let clean = tables.split_off(DRIVES);
     std::fs::create_dir_all(out).map_err(|e| Failure::file(out, e))?;
     folder::write(&out.join("drives"), TRUCK, &tables)?;

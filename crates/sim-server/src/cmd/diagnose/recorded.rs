@@ -14,6 +14,7 @@ use diagnosis::logger::{Draw, as_logged};
 use dynamics::{TruckModel, TruckParameters};
 use mcap::records::{Record, op};
 use sim::Scenario;
+use tractrix_core::ZERO_DEGC_K;
 
 use super::folder::{STEP_S, Table};
 use crate::failure::Failure;
@@ -134,9 +135,6 @@ pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<T
     table.reported_mass_kg = empty_kg + scenario.truck.payload_kg;
     Ok(table)
 }
-
-/// 0 °C in K.
-const ZERO_DEGC_K: f64 = 273.15;
 
 struct Reader {
     definitions: BTreeMap<u16, Layout>,
