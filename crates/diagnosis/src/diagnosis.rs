@@ -10,7 +10,7 @@ use crate::replay::{Module, Prepared};
 use crate::report_models::Models;
 use crate::search::Fit;
 use crate::sentence;
-use crate::unknown::Shape;
+use crate::sure::{Sure, judge};
 use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Plant};
 
 /// What the search concludes.
@@ -97,7 +97,8 @@ pub struct Unknown {
     pub explained_frac: f64,
     /// Evidence, nats.
     pub evidence: f64,
-    /// Signal and error at the knots of the function.
+    /// Signal and error at the knots of the function; the error is a part of the quantity where
+    /// `shape` calls it a factor, otherwise in the unit of the balance.
     pub table: Vec<(f64, f64)>,
 }
 
@@ -207,22 +208,6 @@ pub enum Progress {
 
 /// Part of the evidence of a named cause within which another counts as equally good, nats.
 const AMBIGUOUS_NATS: f64 = 3.0;
-/// Evidence that a free function needs beside or instead of named causes, nats.
-const UNKNOWN_EVIDENCE: f64 = 30.0;
-
-/// Part of the causes' evidence that a free function may add before the causes are not sure: a
-/// substitute for a cause that the catalogue lacks leaves more.
-const LEFT_OVER: f64 = 0.08;
-
-/// Part of the evidence of one cause, and of several in the same module, above which a free function
-/// replaces them if they leave much over.
-const REPLACED_ONE: f64 = 1.0;
-const REPLACED_MANY: f64 = 0.5;
-
-/// Variance over that of drives in order, in a module that a cause explains, above which the cause
-/// is not sure.
-const MISFIT: f64 = 1.2;
-
 /// Timing, noise and tolerances of a truck and its logger, learned from drives that are in order.
 #[derive(Debug, Clone)]
 pub struct Baseline {
@@ -305,7 +290,7 @@ pub fn diagnose_with(
     };
     let fit = problem.gate(fit, &empty);
     progress(Progress::Unknown);
-    let (fit, shape, sure) = outside(&problem, &empty, fit);
+    let (fit, shape, sure) = judge(&problem, &empty, fit);
     let causes = causes(&problem, &fit, &empty, &open);
     let verdict = if sure == Sure::Outside {
         Verdict::Unknown
@@ -396,118 +381,6 @@ fn observable(problem: &Problem<'_>, options: &Options) -> (Vec<usize>, Vec<NotO
     not.retain(|n| !open.iter().any(|i| CATALOGUE[*i].id == n.id));
     not.dedup_by(|a, b| a.id == b.id);
     (open, not)
-}
-
-/// Decides between named causes and a free function of a signal.
-fn outside(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, Sure) {
-    let drives = problem.drives.len() as f64;
-    let beyond = |shapes: Vec<Shape>| -> Vec<Shape> {
-        let mut out: Vec<Shape> = shapes
-            .into_iter()
-            .map(|mut s| {
-                // Drives in order have their free functions too.
-                let usual = problem.reference.free_form[s.module as usize].max(0.0);
-                let agreed = if s.log_z > 0.0 { (s.firm / s.log_z).clamp(0.0, 1.0) } else { 1.0 };
-                s.log_z -= 3.0 * drives * usual;
-                s.firm = agreed * s.log_z;
-                s
-            })
-            .collect();
-        out.sort_by(|a, b| b.log_z.total_cmp(&a.log_z));
-        out
-    };
-    let bare = beyond(problem.shapes(&empty.theta));
-    let rest = if fit.set.is_empty() { bare.clone() } else { beyond(problem.shapes(&fit.theta)) };
-    let describe = |shapes: &[Shape]| {
-        shapes.first().map(|best| Unknown {
-            signals: shapes
-                .iter()
-                .filter(|s| s.module == best.module && s.log_z > 0.5 * best.log_z)
-                .take(3)
-                .map(|s| s.signal)
-                .collect(),
-            quantity: best.module.quantity(),
-            shape: sentence::shape(best),
-            explained_frac: best.explained_frac,
-            evidence: best.log_z,
-            table: best.knots.clone(),
-        })
-    };
-    let best_bare = bare.first().map_or(0.0, |s| s.log_z);
-    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
-        return (empty.clone(), describe(&bare), Sure::Outside);
-    }
-    let left = rest.first().map_or(0.0, |s| s.firm);
-    if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
-        let module = rest.first().map(|s| s.module);
-        let share = fit
-            .set
-            .iter()
-            .filter(|h| {
-                let groups = CATALOGUE[**h].groups();
-                groups.iter().any(|g| module.is_some_and(|m| g.modules().contains(&m)))
-            })
-            .count();
-        // Causes that leave much and that one free function replaces stand in for it.
-        let replaced = if share > 1 { REPLACED_MANY } else { REPLACED_ONE };
-        if share > 0 && best_bare > replaced * fit.log_z {
-            return (empty.clone(), describe(&bare), Sure::Outside);
-        }
-        let sure = match (fit.set.is_empty(), share) {
-            (true, _) => Sure::Outside,
-            (false, 0) => Sure::Yes,
-            (false, _) => Sure::Not,
-        };
-        return (fit, describe(&rest), sure);
-    }
-    if let Some((module, excess, evidence)) = problem.restless(&fit.theta) {
-        let other = if module == Module::Yaw { Module::TrailerYaw } else { Module::Yaw };
-        let lateral = matches!(module, Module::Yaw | Module::TrailerYaw);
-        let unknown = Unknown {
-            signals: if lateral {
-                vec![module.quantity(), other.quantity()]
-            } else {
-                vec![module.quantity()]
-            },
-            quantity: module.quantity(),
-            shape: sentence::restless(module, excess),
-            explained_frac: 0.0,
-            evidence,
-            table: Vec::new(),
-        };
-        if fit.set.is_empty() || evidence > fit.log_z {
-            return (empty.clone(), Some(unknown), Sure::Outside);
-        }
-        return (fit, Some(unknown), Sure::Yes);
-    }
-    let sure = if stands_in(problem, &fit) { Sure::Not } else { Sure::Yes };
-    (fit, None, sure)
-}
-
-/// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
-/// module, or a module that they explain keeps more variance than drives in order have.
-fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
-    let now = problem.settled(&fit.theta);
-    Module::ALL.into_iter().any(|m| {
-        let share = fit
-            .set
-            .iter()
-            .filter(|h| CATALOGUE[**h].groups().iter().any(|g| g.modules().contains(&m)))
-            .count();
-        let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
-        share >= 3 || (share > 0 && excess > MISFIT)
-    })
-}
-
-/// How sure a set of named causes is against what the catalogue does not have.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Sure {
-    /// The causes explain what there is.
-    Yes,
-    /// Much is left that follows a signal: the causes may stand in for something else.
-    Not,
-    /// A free function explains more than any cause.
-    Outside,
 }
 
 fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<(Cause, bool)> {

@@ -33,6 +33,7 @@ mod screen;
 mod search;
 mod sentence;
 mod stats;
+mod sure;
 mod table_trial;
 mod unknown;
 

@@ -150,6 +150,15 @@ pub(crate) fn shape(s: &Shape) -> String {
         .copied()
         .unwrap_or((0.0, 0.0));
     let word = if extreme.1 >= 0.0 { "a rise" } else { "a dip" };
+    if s.factor {
+        return format!(
+            "{} off by a factor: {word} of {:.1} % near {} = {:.4}",
+            s.module.quantity(),
+            100.0 * extreme.1.abs(),
+            s.signal,
+            extreme.0
+        );
+    }
     format!(
         "{word} of {:.3} in the {} balance near {} = {:.4}",
         extreme.1.abs(),

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::drive::Drive;
 use crate::param::Theta;
 use crate::problem::{Problem, Rest};
-use crate::replay::{Module, Prepared};
+use crate::replay::{Module, Prepared, fuel_noise_g_s};
 use crate::stats::evidence;
 
 /// Knots of the spline.
@@ -21,6 +21,8 @@ const LENGTH: f64 = 0.3;
 pub(crate) struct Shape {
     pub(crate) module: Module,
     pub(crate) signal: &'static str,
+    /// A factor on the module's own quantity rather than an addition to it.
+    pub(crate) factor: bool,
     /// Evidence over the present model, nats.
     pub(crate) log_z: f64,
     /// The same as far as the drives agree about it.
@@ -29,6 +31,17 @@ pub(crate) struct Shape {
     pub(crate) knots: Vec<(f64, f64)>,
     /// Part of the module's explainable excess that it takes.
     pub(crate) explained_frac: f64,
+}
+
+/// A disturbance that follows no signal.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Restless {
+    /// The module that shows it most.
+    pub(crate) module: Module,
+    /// Variance there over that of drives in order.
+    pub(crate) excess: f64,
+    /// Evidence, nats.
+    pub(crate) evidence: f64,
 }
 
 type Read = fn(&Prepared, usize) -> f64;
@@ -70,6 +83,16 @@ const SEARCHED: &[(Module, f64)] = &[
     (Module::Imu, 0.05),
 ];
 
+/// Rows of a module below which no function is sought.
+const LEAST_ROWS: f64 = 50.0;
+
+/// Modules whose quantity may be off by a factor that follows one of [`SLOW`], and the prior size
+/// of that factor: an addition that follows a slow signal shows a factor poorly, for it has to be
+/// large where the quantity is large.
+const SCALED: &[Module] = &[Module::Torque, Module::Fuel, Module::Brake, Module::Gps];
+const FACTOR: f64 = 0.05;
+const SLOW: &[&str] = &["time_s", "ambient_temp_degc", "coolant_temp_degc", "gps_altitude_m"];
+
 /// Signals that the module itself writes, which its own noise would imitate.
 fn own(module: Module, signal: &str) -> bool {
     module.quantity() == signal && module != Module::Force
@@ -81,14 +104,35 @@ const DISPERSION_PRIOR: f64 = 2.0;
 /// Excess of the whitened variance over drives in order that no tolerance explains.
 const RESTLESS: f64 = 1.1;
 
-/// Means of a signal over rows of `step` samples.
-fn means(d: &Prepared, read: Read, step: usize) -> Vec<f64> {
+/// A signal over the rows of a module: its means over `step` samples, or what it is as a shift
+/// begins.
+fn means(d: &Prepared, read: Read, module: Module) -> Vec<f64> {
+    if module == Module::Shift {
+        return d.shifts.iter().map(|s| read(d, s.0)).collect();
+    }
+    let step = module.row_step();
     (0..d.n.div_ceil(step))
         .map(|k| {
             let (from, to) = (k * step, (k * step + step).min(d.n));
             (from..to).map(|i| read(d, i)).sum::<f64>() / (to - from).max(1) as f64
         })
         .collect()
+}
+
+/// Means of a channel over rows of `step` samples.
+fn means_of(x: &[f64], step: usize) -> Vec<f64> {
+    x.chunks(step).map(|row| row.iter().sum::<f64>() / row.len() as f64).collect()
+}
+
+/// What a factor on a module's quantity is multiplied with: the modelled quantity per row, in the
+/// unit of the `residual`. The measured one would carry the residual's own noise.
+fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
+    let measured = means_of(d.measured(module), module.row_step());
+    let modelled = |(x, r): (&f64, &f64)| match module {
+        Module::Fuel => x / fuel_noise_g_s(*x) - r,
+        _ => x - r,
+    };
+    measured.iter().zip(residual).map(modelled).collect()
 }
 
 /// How much more the drives disagree about a free function than their noise says, at least 1: the
@@ -114,9 +158,8 @@ fn dispersion(
 
 impl Problem<'_> {
     /// A disturbance that follows no measured signal: more variance than drives in order have, in
-    /// tractor and trailer yaw alike (gusts), or far more in one module. The module that shows it
-    /// most, its excess and the evidence, nats.
-    pub(crate) fn restless(&self, theta: &Theta) -> Option<(Module, f64, f64)> {
+    /// tractor and trailer yaw alike (gusts), or far more in one module.
+    pub(crate) fn restless(&self, theta: &Theta) -> Option<Restless> {
         let now = self.settled(theta);
         let excess = |m: Module| now[m as usize] / self.reference.settled[m as usize].max(1.0);
         let rows = |m: Module| -> f64 {
@@ -133,11 +176,12 @@ impl Problem<'_> {
                         || gusts && *m == Module::Yaw
                         || gusts && *m == Module::TrailerYaw)
             })
-            .map(|m| {
-                let e = excess(m);
-                (m, e, 0.5 * rows(m) * (e - 1.0 - e.ln()))
+            .map(|module| {
+                let excess = excess(module);
+                let evidence = 0.5 * rows(module) * (excess - 1.0 - excess.ln());
+                Restless { module, excess, evidence }
             })
-            .max_by(|a, b| a.2.total_cmp(&b.2))
+            .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
     }
 
     /// The best free-form functions at `theta`, one per module and signal, best first.
@@ -148,19 +192,23 @@ impl Problem<'_> {
         for (module, size) in SEARCHED {
             let m = *module as usize;
             let rows: f64 = residuals.iter().map(|r| r.whitened[m].len() as f64).sum();
-            if !self.drives.iter().any(|d| d.available[m]) || rows < 100.0 {
+            if !self.drives.iter().any(|d| d.available[m]) || rows < LEAST_ROWS {
                 continue;
             }
+            let weights = SCALED.contains(module).then(|| {
+                self.each(|i| own_size(&self.drives[i], *module, &self.raw(i, *module, theta)))
+            });
             for (signal, read) in SIGNALS {
                 if own(*module, signal) {
                     continue;
                 }
-                let step = module.row_step();
                 let values = rows_of
-                    .entry((step, *signal))
-                    .or_insert_with(|| self.each(|i| means(&self.drives[i], *read, step)));
-                if let Some(s) = self.shape(*module, *size, signal, values, &residuals) {
-                    out.push(s);
+                    .entry((module.row_step(), *signal))
+                    .or_insert_with(|| self.each(|i| means(&self.drives[i], *read, *module)));
+                out.extend(self.shape((*module, signal, None), *size, values, &residuals));
+                if let (Some(weights), true) = (&weights, SLOW.contains(signal)) {
+                    let form = (*module, *signal, Some(weights.as_slice()));
+                    out.extend(self.shape(form, FACTOR, values, &residuals));
                 }
             }
         }
@@ -168,11 +216,12 @@ impl Problem<'_> {
         out
     }
 
+    /// A free function of `size` of a signal with these `values` in a module, times the weights of
+    /// the rows if there are any.
     fn shape(
         &self,
-        module: Module,
+        (module, signal, weights): (Module, &'static str, Option<&[Vec<f64>]>),
         size: f64,
-        signal: &'static str,
         values: &[Vec<f64>],
         residuals: &[Rest],
     ) -> Option<Shape> {
@@ -189,13 +238,15 @@ impl Problem<'_> {
             return None;
         }
         let parts = self.each(|i| {
-            let place = |(x, ok): (&f64, &bool)| {
+            let weight = |k: usize| weights.map_or(1.0, |w| w[i].get(k).copied().unwrap_or(0.0));
+            let place = |(k, (x, ok)): (usize, (&f64, &bool))| {
                 let x = ((x - lo) / width).clamp(0.0, (KNOTS - 1) as f64);
                 let j = (x as usize).min(KNOTS - 2);
-                ok.then_some((j, x - j as f64))
+                let (way, weight) = (x - j as f64, weight(k));
+                ok.then_some((j, [weight * (1.0 - way), weight * way]))
             };
-            let places: Vec<Option<(usize, f64)>> =
-                values[i].iter().zip(&self.drives[i].valid[m]).map(place).collect();
+            let rows = values[i].iter().zip(&self.drives[i].valid[m]);
+            let places: Vec<Option<(usize, [f64; 2])>> = rows.enumerate().map(place).collect();
             self.hats(i, m, &places, &residuals[i])
         });
         let kernel = DMatrix::from_fn(KNOTS, KNOTS, |i, j| {
@@ -226,6 +277,7 @@ impl Problem<'_> {
         Some(Shape {
             module,
             signal,
+            factor: weights.is_some(),
             log_z,
             firm,
             knots: (0..KNOTS).map(|k| (lo + k as f64 * width, f[k])).collect(),

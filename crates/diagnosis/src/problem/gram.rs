@@ -140,14 +140,14 @@ impl Problem<'_> {
     }
 
     /// Marginal Gram matrix over the residual and hat functions of one module: `places` gives the
-    /// knot to the left and the way to the next, per row. Only a few hats touch a row, so the
+    /// knot to the left and the size of its hat and of the next, per row. Only a few hats touch a row, so the
     /// whitened hats are never written out, and everything else comes to the hats through the
     /// adjoint of the whitening filter. With the products with the common effects.
     pub(crate) fn hats(
         &self,
         i: usize,
         m: usize,
-        places: &[Option<(usize, f64)>],
+        places: &[Option<(usize, [f64; 2])>],
         rest: &Rest,
     ) -> (DMatrix<f64>, DMatrix<f64>) {
         let nuisance = &self.nuisance[i];
@@ -160,20 +160,19 @@ impl Problem<'_> {
         let mut z = vec![0.0; touched * KNOTS];
         let rows = residual.len().min(places.len());
         for k in 0..rows {
-            let Some((left, way)) = places[k] else { continue };
+            let Some((left, sizes)) = places[k] else { continue };
             let row = &adjoint.rows[k * touched..(k + 1) * touched];
-            for (at, w) in [(left, 1.0 - way), (left + 1, way)] {
+            for (at, w) in [(left, sizes[0]), (left + 1, sizes[1])] {
                 r[at] += residual[k] * w;
                 let z = &mut z[at * touched..(at + 1) * touched];
                 z.iter_mut().zip(row).for_each(|(z, c)| *z += c * w);
             }
             let (mut hat, mut low, mut high) = ([0.0; KNOTS], left, left + 1);
-            hat[left] = 1.0 - way;
-            hat[left + 1] = way;
+            [hat[left], hat[left + 1]] = sizes;
             for (a, before) in whitener.coefficients.iter().zip(places[..k].iter().rev()) {
-                if let Some((j, w)) = *before {
-                    hat[j] -= a * (1.0 - w);
-                    hat[j + 1] -= a * w;
+                if let Some((j, sizes)) = *before {
+                    hat[j] -= a * sizes[0];
+                    hat[j + 1] -= a * sizes[1];
                     (low, high) = (low.min(j), high.max(j + 1));
                 }
             }

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{Direction, Problem, inner};
 use crate::param::{SPECS, Theta};
-use crate::replay::{GROUPS, Group, MODULES, Residuals, affects, offset_of, replay_group};
+use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
 
 /// Residuals of one group at one point, or a sensitivity: minus the derivative of the residual.
 #[derive(Debug)]
@@ -107,6 +107,15 @@ impl Problem<'_> {
         let signals = Arc::new(Signals::new(group, true, raw));
         self.kept[i].put(key, signals.clone());
         signals
+    }
+
+    /// Residuals of a module at `theta` before whitening.
+    pub(crate) fn raw(&self, i: usize, module: Module, theta: &Theta) -> Vec<f64> {
+        let of = |group: &Group| {
+            let at = group.modules().iter().position(|m| *m == module)?;
+            self.point(i, *group, theta).raw.get(at).cloned()
+        };
+        GROUPS.iter().find_map(of).unwrap_or_default()
     }
 
     /// Residuals of all groups at `theta`.

@@ -1,0 +1,161 @@
+//! Named causes against what the catalogue does not have: whether the causes explain the drives,
+//! may stand in for something else, or give way to a free function of a signal.
+
+use crate::Unknown;
+use crate::hypothesis::CATALOGUE;
+use crate::param::P;
+use crate::problem::Problem;
+use crate::replay::Module;
+use crate::search::Fit;
+use crate::sentence;
+use crate::unknown::{Restless, Shape};
+
+/// Evidence that a free function needs beside or instead of named causes, nats.
+const UNKNOWN_EVIDENCE: f64 = 30.0;
+
+/// Part of the causes' evidence that a free function may add before the causes are not sure: a
+/// substitute for a cause that the catalogue lacks leaves more.
+const LEFT_OVER: f64 = 0.08;
+
+/// Part of the evidence of one cause, and of several in the same module, above which a free function
+/// replaces them if they leave much over.
+const REPLACED_ONE: f64 = 1.0;
+const REPLACED_MANY: f64 = 0.5;
+
+/// Variance over that of drives in order, in a module that a cause explains, above which the cause
+/// is not sure.
+const MISFIT: f64 = 1.2;
+
+/// Part of the width between its bounds within which a figure counts as at one.
+const BOUND: f64 = 1e-3;
+
+/// Part of the excess of a module below which a function of a signal does not describe what is
+/// left: noise that comes and goes gives every signal something.
+const FOLLOWS: f64 = 0.05;
+
+/// How sure a set of named causes is against what the catalogue does not have.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Sure {
+    /// The causes explain what there is.
+    Yes,
+    /// Much is left that they do not explain: the causes may stand in for something else.
+    Not,
+    /// A free function, or a random disturbance, explains more than any cause.
+    Outside,
+}
+
+/// Decides between named causes, a free function of a signal and a random disturbance.
+pub(crate) fn judge(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, Sure) {
+    let bare = beyond(problem, problem.shapes(&empty.theta));
+    let best_bare = bare.first().map_or(0.0, |s| s.log_z);
+    if let Some(random) = problem.restless(&empty.theta)
+        && random.evidence > best_bare.max(1.15 * fit.log_z)
+        && bare.first().is_none_or(|s| s.module != random.module || s.explained_frac < FOLLOWS)
+    {
+        return (empty.clone(), Some(noise(&random)), Sure::Outside);
+    }
+    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
+        return (empty.clone(), describe(&bare), Sure::Outside);
+    }
+    let rest =
+        if fit.set.is_empty() { bare.clone() } else { beyond(problem, problem.shapes(&fit.theta)) };
+    let left = rest.first().map_or(0.0, |s| s.firm);
+    if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
+        let share = rest.first().map_or(0, |s| sharing(&fit, s.module));
+        // Causes that leave much and that one free function replaces stand in for it.
+        let replaced = if share > 1 { REPLACED_MANY } else { REPLACED_ONE };
+        if share > 0 && best_bare > replaced * fit.log_z {
+            return (empty.clone(), describe(&bare), Sure::Outside);
+        }
+        let sure = match (fit.set.is_empty(), share) {
+            (true, _) => Sure::Outside,
+            (false, 0) => Sure::Yes,
+            (false, _) => Sure::Not,
+        };
+        return (fit, describe(&rest), sure);
+    }
+    if let Some(random) = problem.restless(&fit.theta) {
+        if fit.set.is_empty() || random.evidence > fit.log_z {
+            return (empty.clone(), Some(noise(&random)), Sure::Outside);
+        }
+        let sure = if sharing(&fit, random.module) > 0 { Sure::Not } else { Sure::Yes };
+        return (fit, Some(noise(&random)), sure);
+    }
+    let sure = if stands_in(problem, &fit) { Sure::Not } else { Sure::Yes };
+    (fit, None, sure)
+}
+
+/// Free functions beyond those that drives in order have too, best first.
+fn beyond(problem: &Problem<'_>, mut shapes: Vec<Shape>) -> Vec<Shape> {
+    let drives = problem.drives.len() as f64;
+    for s in &mut shapes {
+        let usual = problem.reference.free_form[s.module as usize].max(0.0);
+        let agreed = if s.log_z > 0.0 { (s.firm / s.log_z).clamp(0.0, 1.0) } else { 1.0 };
+        s.log_z -= 3.0 * drives * usual;
+        s.firm = agreed * s.log_z;
+    }
+    shapes.sort_by(|a, b| b.log_z.total_cmp(&a.log_z));
+    shapes
+}
+
+/// How many of the causes show in a module.
+fn sharing(fit: &Fit, module: Module) -> usize {
+    let shows = |h: &&usize| {
+        let groups = CATALOGUE[**h].groups();
+        groups.iter().any(|g| g.modules().contains(&module))
+    };
+    fit.set.iter().filter(shows).count()
+}
+
+/// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
+/// module, a module that they explain keeps more variance than drives in order have, or a figure
+/// has run to its bound.
+fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
+    let now = problem.settled(&fit.theta);
+    let strained = Module::ALL.into_iter().any(|m| {
+        let share = sharing(fit, m);
+        let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
+        share >= 3 || (share > 0 && excess > MISFIT)
+    });
+    let at_bound = |p: &P| {
+        let (s, x) = (p.spec(), fit.theta[*p as usize] - problem.reference.theta[*p as usize]);
+        x <= s.lo + BOUND * (s.hi - s.lo) && s.lo < 0.0 || x >= s.hi - BOUND * (s.hi - s.lo)
+    };
+    strained || fit.set.iter().flat_map(|h| CATALOGUE[*h].sizes).any(at_bound)
+}
+
+fn describe(shapes: &[Shape]) -> Option<Unknown> {
+    let best = shapes.first()?;
+    let mut signals: Vec<&'static str> = Vec::new();
+    for s in shapes.iter().filter(|s| s.module == best.module && s.log_z > 0.5 * best.log_z) {
+        if signals.len() < 3 && !signals.contains(&s.signal) {
+            signals.push(s.signal);
+        }
+    }
+    Some(Unknown {
+        signals,
+        quantity: best.module.quantity(),
+        shape: sentence::shape(best),
+        explained_frac: best.explained_frac,
+        evidence: best.log_z,
+        table: best.knots.clone(),
+    })
+}
+
+/// A disturbance that follows no signal: the channel that shows it, and the other yaw rate with it.
+fn noise(random: &Restless) -> Unknown {
+    let quantity = random.module.quantity();
+    let signals = match random.module {
+        Module::Yaw => vec![quantity, Module::TrailerYaw.quantity()],
+        Module::TrailerYaw => vec![quantity, Module::Yaw.quantity()],
+        _ => vec![quantity],
+    };
+    Unknown {
+        signals,
+        quantity,
+        shape: sentence::restless(random.module, random.excess),
+        explained_frac: 0.0,
+        evidence: random.evidence,
+        table: Vec::new(),
+    }
+}
