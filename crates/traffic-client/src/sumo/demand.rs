@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 
 use tractrix_core::{Geometry, VehicleClass};
 
+use super::config::SumoConfig;
 use super::network::Network;
-use super::source::SumoConfig;
 use crate::native::{ClassConfig, TrafficConfig};
 use crate::philox::{Draws, Stream};
 use crate::replay::class_of_length;

@@ -7,6 +7,7 @@
 
 mod check;
 pub mod codec;
+mod config;
 mod demand;
 mod error;
 pub mod link;
@@ -14,11 +15,14 @@ pub mod network;
 mod plain;
 pub mod process;
 pub mod session;
+mod shown;
 mod source;
+mod step;
 pub mod tcp;
 
 pub use check::{ImportCheck, TOLERANCE_M, check};
+pub use config::{SumoConfig, TypeAttributes};
 pub use error::SumoError;
 pub use link::{Link, Timeouts};
 pub use process::Programs;
-pub use source::{SumoConfig, SumoTraffic, TypeAttributes};
+pub use source::SumoTraffic;
