@@ -158,11 +158,14 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
 /// Road-wheel angle of sample after sample: dead time, free play, offset, ratio, lag.
 struct RoadWheel<'a> {
     steer: &'a [f64],
+    /// What is left of the angle after a sample, and the shares of the targets at its begin and end.
     keep: f64,
+    shares: [f64; 2],
     ratio: f64,
     offset: f64,
     play: f64,
     gear: f64,
+    target: f64,
     angle: f64,
 }
 
@@ -173,14 +176,18 @@ impl<'a> RoadWheel<'a> {
         let ratio = steering.ratio * (1.0 + t[P::SteerRatio as usize]);
         let offset = steering.offset_rad + t[P::SteerOffset as usize];
         let gear = d.steer[0];
+        let target = (gear - offset) / ratio;
+        let (keep, shares) = first_order_hold(lag);
         Self {
             steer: &d.steer,
-            keep: if lag > 1e-3 { (-Drive::STEP_S / lag).exp() } else { 0.0 },
+            keep,
+            shares,
             ratio,
             offset,
             play: 0.5 * (steering.free_play_rad + t[P::FreePlay as usize]).max(0.0),
             gear,
-            angle: (gear - offset) / ratio,
+            target,
+            angle: target,
         }
     }
 
@@ -188,8 +195,39 @@ impl<'a> RoadWheel<'a> {
     fn step(&mut self, i: usize) -> f64 {
         let wheel = self.steer[i];
         self.gear = self.gear.clamp(wheel - self.play, wheel + self.play);
-        let target = (self.gear - self.offset) / self.ratio;
-        self.angle = target + (self.angle - target) * self.keep;
+        let before = self.target;
+        self.target = (self.gear - self.offset) / self.ratio;
+        self.angle =
+            self.keep * self.angle + self.shares[0] * before + self.shares[1] * self.target;
         self.angle
+    }
+}
+
+/// What is left of the state of a first-order lag after a sample, and what it takes of its target at
+/// the begin and at the end of the sample, exactly for a target that moves evenly in between.
+fn first_order_hold(lag_s: f64) -> (f64, [f64; 2]) {
+    if lag_s < 1e-3 {
+        return (0.0, [0.0, 1.0]);
+    }
+    let keep = (-Drive::STEP_S / lag_s).exp();
+    let end = 1.0 - (1.0 - keep) * lag_s / Drive::STEP_S;
+    (keep, [1.0 - keep - end, end])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lag_follows_a_ramp_one_lag_behind_whatever_the_sample_time() {
+        for lag in [0.02, 0.08, 0.3] {
+            let (keep, shares) = first_order_hold(lag);
+            let mut angle = 0.0;
+            for i in 0..200 {
+                let target = f64::from(i) * Drive::STEP_S;
+                angle = keep * angle + shares[0] * target + shares[1] * (target + Drive::STEP_S);
+            }
+            assert!((angle - (200.0 * Drive::STEP_S - lag)).abs() < 1e-9, "{lag}: {angle}");
+        }
     }
 }

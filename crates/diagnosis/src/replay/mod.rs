@@ -12,6 +12,7 @@ mod powertrain;
 mod prepared;
 mod profiles;
 mod sensors;
+mod smooth;
 
 pub(crate) use powertrain::noise_g_s as fuel_noise_g_s;
 pub(crate) use prepared::Prepared;

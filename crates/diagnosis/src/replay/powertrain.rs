@@ -15,9 +15,11 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Torque as usize];
     let (engine, file) = (&plant.engine, &plant.truck.engine);
     let delay = (file.pedal_delay_s + t[P::PedalDelay as usize]) / Drive::STEP_S;
-    let boost_lag = (file.slow_lag_s + t[P::TurboLag as usize]).max(0.02);
-    let keep = |lag: f64| (-Drive::STEP_S / lag).exp();
-    let (slow, fast) = (keep(boost_lag), keep(file.fast_lag_s));
+    let rise = Rise {
+        fast_s: file.fast_lag_s,
+        slow_s: (file.slow_lag_s + t[P::TurboLag as usize]).max(0.02),
+    };
+    let keep = [rise.fast_s, rise.slow_s].map(|lag| (-Drive::STEP_S / lag).exp());
     let percent = 100.0 / file.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
     let pedal = d.profiles.get(Kind::Pedal, [delay, 0.0], || {
         (0..d.n).map(|i| at_index(&d.pedal, i as f64 - delay)).collect()
@@ -33,18 +35,43 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
         }
         for i in 2 * k..2 * k + 2 {
             if !running {
+                // The measurement is where it starts: what follows is the response.
                 torque = d.torque[i] / percent;
                 running = true;
+                continue;
             }
-            let n = d.omega[i];
+            let n = d.turning[i];
             let full = d.full_load[i] * if derates { derate(d, t, i) } else { 1.0 };
             let demand = engine.governed_nm(engine.pedal_demand_nm(pedal[i], n, full), n, full);
-            let keep = if engine.boosts(torque, demand, full) { slow } else { fast };
-            torque = demand + (torque - demand) * keep;
+            let threshold = file.lag_threshold_frac * full;
+            torque = if torque < threshold && threshold < demand {
+                rise.across(torque, demand, threshold, keep[0])
+            } else {
+                demand + (torque - demand) * keep[usize::from(engine.boosts(torque, demand, full))]
+            };
             out[k] += 0.5 * (d.torque[i] - torque.max(0.0) * percent);
         }
     }
     out
+}
+
+/// Lags of the torque on its way up, s.
+struct Rise {
+    fast_s: f64,
+    slow_s: f64,
+}
+
+impl Rise {
+    /// Torque after a sample in which it may pass the threshold of the slow lag, exactly for a
+    /// constant demand; `keep` is what the fast lag leaves of the gap in a whole sample.
+    fn across(&self, torque: f64, demand: f64, threshold: f64, keep: f64) -> f64 {
+        let (gap, left) = (demand - torque, demand - threshold);
+        if gap * keep >= left {
+            return demand - gap * keep;
+        }
+        let slow_s = Drive::STEP_S - self.fast_s * (gap / left).ln();
+        demand - left * (-slow_s / self.slow_s).exp()
+    }
 }
 
 /// Part of the full load that is left at this altitude, air and coolant temperature.
@@ -107,4 +134,25 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
 /// Noise of a fuel rate, g/s: a constant part and one percent of the rate.
 pub(crate) fn noise_g_s(rate_g_s: f64) -> f64 {
     0.03 + 0.01 * rate_g_s
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sample_across_the_threshold_is_that_of_many_small_steps() {
+        let rise = Rise { fast_s: 0.15, slow_s: 0.9 };
+        let keep = (-Drive::STEP_S / rise.fast_s).exp();
+        for (from, demand) in [(800.0, 2600.0), (905.0, 1500.0), (300.0, 1000.0)] {
+            let (threshold, steps) = (910.0, 100_000);
+            let mut torque: f64 = from;
+            for _ in 0..steps {
+                let lag = if torque > threshold { rise.slow_s } else { rise.fast_s };
+                torque += (demand - torque) * Drive::STEP_S / f64::from(steps) / lag;
+            }
+            let at_once = rise.across(from, demand, threshold, keep);
+            assert!((at_once - torque).abs() < 0.05, "{from}: {at_once} {torque}");
+        }
+    }
 }

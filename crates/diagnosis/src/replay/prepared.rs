@@ -6,6 +6,7 @@ use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::force::Inputs;
 use super::profiles::Profiles;
+use super::smooth;
 use super::{MODULES, Module as M};
 use crate::{Channel as C, Drive, Plant};
 
@@ -29,6 +30,8 @@ pub(crate) struct Prepared {
     pub(crate) rpm: Vec<f64>,
     /// Engine speed, rad/s.
     pub(super) omega: Vec<f64>,
+    /// The same without the noise of its message.
+    pub(super) turning: Vec<f64>,
     pub(crate) gear: Vec<usize>,
     pub(crate) engine_brake: Vec<f64>,
     pub(crate) xbr: Vec<f64>,
@@ -134,8 +137,9 @@ impl Prepared {
             .collect();
         let rpm = get(C::EngineSpeedRpm, plant.truck.engine.idle_speed_rpm);
         let omega: Vec<f64> = rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
+        let turning = smooth::running_mean(&omega, smooth::CRANK);
         let altitude = get(C::GpsAltitudeM, 0.0);
-        let air = omega.iter().zip(&altitude).zip(&ambient);
+        let air = turning.iter().zip(&altitude).zip(&ambient);
         let full_load =
             air.map(|((n, h), t)| plant.engine.full_load_at_nm(*n, *h, t + ZERO_DEGC_K)).collect();
         let gear: Vec<usize> = get(C::Gear, 0.0).iter().map(|g| g.max(0.0) as usize).collect();
@@ -161,7 +165,7 @@ impl Prepared {
             xbr: get(C::XbrDecelMS2, 0.0),
             pressure: get(C::BrakePressureKpa, 0.0),
             fine_pressure: Vec::new(),
-            steer: get(C::SteeringWheelRad, 0.0),
+            steer: smooth::quadratic(&get(C::SteeringWheelRad, 0.0)),
             yaw: get(C::YawRateRadS, 0.0),
             trailer_yaw: get(C::TrailerYawRateRadS, 0.0),
             accel_y: get(C::AccelYMS2, 0.0),
@@ -171,6 +175,7 @@ impl Prepared {
             grade_by_s: GradeBySection::new(&s_map, &grade),
             full_load,
             omega,
+            turning,
             balance: Inputs::default(),
             profiles: Profiles::default(),
             speed,

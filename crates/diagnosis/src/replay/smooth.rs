@@ -1,0 +1,69 @@
+//! Inputs of the replay without the noise of their messages.
+//!
+//! What is driven through a free play or through a lag that differs between rise and fall must not
+//! jitter: the jitter is rectified, and the fit takes it for a larger play or a shorter lag (errors
+//! in variables). Both filters are symmetric in time and leave straight lines alone.
+
+/// Samples on either side for the engine speed, which the vehicle's mass carries in gear: less than
+/// the margin around shifts.
+pub(super) const CRANK: usize = 10;
+
+/// Samples on either side for the hand wheel.
+const WHEEL: usize = 4;
+
+/// Centred mean over `side` samples on either side, over fewer near the ends.
+pub(super) fn running_mean(x: &[f64], side: usize) -> Vec<f64> {
+    let sums = super::prepared::running_sum(x.iter().copied());
+    let n = x.len();
+    (0..n)
+        .map(|i| {
+            let side = side.min(i).min(n - 1 - i);
+            (sums[i + side + 1] - sums[i - side]) / (2 * side + 1) as f64
+        })
+        .collect()
+}
+
+/// Local parabola through [`WHEEL`] samples on either side (Savitzky and Golay, Analytical
+/// Chemistry 36, 1964); the ends keep their samples.
+pub(super) fn quadratic(x: &[f64]) -> Vec<f64> {
+    let m = WHEEL as f64;
+    let weights: Vec<f64> = (0..=WHEEL)
+        .map(|k| {
+            let k = k as f64;
+            3.0 * (3.0 * m * m + 3.0 * m - 1.0 - 5.0 * k * k)
+                / ((2.0 * m + 3.0) * (2.0 * m + 1.0) * (2.0 * m - 1.0))
+        })
+        .collect();
+    let mut out = x.to_vec();
+    for (y, window) in out.iter_mut().skip(WHEEL).zip(x.windows(2 * WHEEL + 1)) {
+        *y = weights[0] * window[WHEEL]
+            + (1..=WHEEL)
+                .map(|k| weights[k] * (window[WHEEL - k] + window[WHEEL + k]))
+                .sum::<f64>();
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn straight_lines_stay_and_noise_halves() {
+        let line: Vec<f64> = (0..200).map(|i| 0.3 + 0.02 * f64::from(i)).collect();
+        for smoothed in [quadratic(&line), running_mean(&line, CRANK)] {
+            assert!(smoothed.iter().zip(&line).all(|(x, y)| (x - y).abs() < 1e-9));
+        }
+        // Alternating neighbours are the fastest jitter there is.
+        let jitter: Vec<f64> = (0..200).map(|i| if i % 3 == 0 { 1.0 } else { -0.5 }).collect();
+        let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
+        assert!(rms(&quadratic(&jitter)[WHEEL..200 - WHEEL]) < 0.5 * rms(&jitter));
+        assert!(rms(&running_mean(&jitter, CRANK)[CRANK..200 - CRANK]) < 0.1 * rms(&jitter));
+    }
+
+    #[test]
+    fn a_short_record_is_left_alone() {
+        assert_eq!(quadratic(&[1.0, 5.0, 2.0]), [1.0, 5.0, 2.0]);
+        assert_eq!(running_mean(&[], CRANK), Vec::<f64>::new());
+    }
+}
