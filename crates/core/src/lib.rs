@@ -17,6 +17,7 @@ mod ego;
 mod error;
 mod limits;
 mod plan;
+mod provenance;
 mod scene;
 mod seams;
 mod table;
@@ -30,6 +31,7 @@ pub use limits::{
     VehicleLimits,
 };
 pub use plan::{GuardReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus, SpeedPoint};
+pub use provenance::Provenance;
 pub use scene::{Neighbour, Scene, VehicleClass};
 pub use seams::{Recorder, Stamped, Tick, TrafficSource, Vehicle};
 pub use table::{Curve, Grid};

@@ -19,6 +19,16 @@ impl Failure {
         Self::Input(error.to_string())
     }
 
+    /// An option that cannot be used, named as on the command line.
+    pub(crate) fn of_option(error: sim::SimError) -> Self {
+        match error {
+            sim::SimError::Override { option, value, why } => {
+                Self::Input(format!("--{} {value}: {why}", option.replace('_', "-")))
+            }
+            other => Self::input(other),
+        }
+    }
+
     /// Failed work, from any error.
     pub(crate) fn work(error: impl std::fmt::Display) -> Self {
         Self::Work(error.to_string())

@@ -7,18 +7,24 @@ pub(crate) const SCHEMA: u32 = 1;
 
 /// The keys that open every JSON object.
 #[derive(Debug, Clone, Copy, Serialize)]
-pub(crate) struct Provenance {
-    schema: u32,
-    version: &'static str,
-    git_revision: &'static str,
-    /// Seed of the run; 0 for work without randomness.
-    seed: u64,
-}
+#[serde(transparent)]
+pub(crate) struct Provenance(tractrix_core::Provenance);
 
 impl Provenance {
-    /// The provenance of an output that this seed determines.
+    /// The provenance of an output that this seed determines; 0 for work without randomness.
     pub(crate) const fn of_seed(seed: u64) -> Self {
-        Self { schema: SCHEMA, version: VERSION, git_revision: GIT_REVISION, seed }
+        Self(tractrix_core::Provenance {
+            schema: SCHEMA,
+            version: VERSION,
+            git_revision: GIT_REVISION,
+            seed,
+        })
+    }
+}
+
+impl From<Provenance> for tractrix_core::Provenance {
+    fn from(provenance: Provenance) -> Self {
+        provenance.0
     }
 }
 

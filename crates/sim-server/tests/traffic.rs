@@ -78,7 +78,7 @@ fn sources_and_modes_that_cannot_be_are_one_line() {
         (&["--traffic", "replay"], "replay:FILE"),
         (&["--traffic", "replay:nowhere.csv"], "nowhere.csv"),
         (&["--mode", "all"], "all"),
-        (&["--mode", "re"], "--manifest"),
+        (&["--mode", "re"], "manifest"),
         (&["--mode", "rep"], "replay:FILE"),
         (&["--traffic", "native", "--on-traffic-failure", "pray"], "pray"),
         (&["--manifest", "nowhere.toml"], "nowhere.toml"),

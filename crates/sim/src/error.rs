@@ -30,6 +30,16 @@ pub enum SimError {
         /// The names that exist.
         known: String,
     },
+    /// A change to a scenario that cannot be made.
+    #[error("{option} {value}: {why}")]
+    Override {
+        /// Which word: a field of [`crate::Overrides`].
+        option: &'static str,
+        /// The value given.
+        value: String,
+        /// What is wrong with it.
+        why: String,
+    },
     /// The road cannot be used.
     #[error(transparent)]
     Road(#[from] road::RoadError),

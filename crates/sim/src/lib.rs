@@ -11,8 +11,11 @@ mod collision;
 mod error;
 mod memory;
 mod metrics;
+mod overrides;
+mod run_report;
 mod scenario;
 mod sim_truck;
+mod tick_times;
 mod traffic;
 mod traffic_section;
 mod world;
@@ -21,8 +24,11 @@ pub use collision::{Footprint, footprints_overlap};
 pub use error::SimError;
 pub use memory::{MemoryRecord, MemoryRecorder};
 pub use metrics::{Metrics, Summary};
+pub use overrides::Overrides;
+pub use run_report::{EndReason, RunReport, WallClock};
 pub use scenario::{EgoStart, RunLimits, Scenario, TruckSection, Weather};
 pub use sim_truck::SimTruck;
+pub use tick_times::{TickTime, TickTimes};
 pub use traffic::{Traffic, read_manifest, recording_of};
 pub use traffic_section::{
     Family, OnFailure, ReplaySection, SumoSection, SumoTimeouts, TrafficKind, TrafficSection,

@@ -159,6 +159,18 @@ impl Scenario {
         Self::from_toml_str(name, Self::builtin_text(name)?)
     }
 
+    /// A scenario file if the name ends in `.toml` or has a folder, else a built-in scenario.
+    ///
+    /// # Errors
+    /// As [`Self::load`] or [`Self::builtin`].
+    pub fn named(name: &str) -> Result<Self, SimError> {
+        if name.ends_with(".toml") || name.contains(std::path::MAIN_SEPARATOR) {
+            Self::load(name.as_ref())
+        } else {
+            Self::builtin(name)
+        }
+    }
+
     /// Reads a scenario file.
     ///
     /// # Errors
@@ -186,8 +198,33 @@ impl Scenario {
             });
             bad(format!("{place}{}", e.message().replace('\n', " ")))
         })?;
-        let wrong = scenario.violations();
-        if wrong.is_empty() { Ok(scenario) } else { Err(bad(wrong.join("; "))) }
+        scenario.checked().map_err(bad)?;
+        Ok(scenario)
+    }
+
+    /// Checks a scenario that was changed or made in memory.
+    ///
+    /// # Errors
+    /// [`SimError::Scenario`] names all values out of range at once.
+    pub fn check(&self) -> Result<(), SimError> {
+        self.checked().map_err(|why| SimError::Scenario { name: self.name.clone(), why })
+    }
+
+    fn checked(&self) -> Result<(), String> {
+        let wrong = self.violations();
+        if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) }
+    }
+
+    /// The seed of a run: the one given, else the one of the manifest that is repeated, else 1.
+    ///
+    /// # Errors
+    /// As [`crate::read_manifest`].
+    pub fn seed(&self, given: Option<u64>) -> Result<u64, SimError> {
+        match (given, &self.traffic.manifest) {
+            (Some(seed), _) => Ok(seed),
+            (None, Some(file)) => crate::read_manifest(file.as_ref()).map(|m| m.seed),
+            (None, None) => Ok(1),
+        }
     }
 
     /// The road that the scenario names; `recording:LANES` lays one with that many lanes under the

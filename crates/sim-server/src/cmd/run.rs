@@ -10,7 +10,7 @@ use crate::driver::Pace;
 use crate::failure::Failure;
 
 mod execute;
-pub(super) mod options;
+mod options;
 
 /// Drives a scenario in closed loop, with a live dashboard, and records it.
 #[derive(Debug, Parser)]
@@ -85,6 +85,6 @@ pub(crate) struct Args {
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let scenario = options::scenario(args)?;
-    let seed = options::seed(args.seed, &scenario)?;
+    let seed = scenario.seed(args.seed).map_err(Failure::input)?;
     execute::execute(args, seed, &scenario)
 }

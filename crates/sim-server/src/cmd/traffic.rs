@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use clap::{Parser, ValueEnum};
 use road::Road;
-use sim::{Scenario, Traffic, TrafficKind};
+use sim::{Overrides, Scenario, Traffic, TrafficKind};
 use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
 use traffic_client::Mode;
 use traffic_client::calibrate::{Effort, Lesson, calibrate, drive_bounded};
@@ -15,7 +15,6 @@ use traffic_client::replay::{Frame, Recording, Row, write_parquet};
 use traffic_client::stats::{Observer, Samples};
 
 use crate::cli::positive;
-use crate::cmd::run::options::{TrafficChanges, load, seed};
 use crate::failure::Failure;
 use crate::output;
 
@@ -94,21 +93,19 @@ const DURATION_S: f64 = 300.0;
 
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
-    let mut scenario = load(&args.scenario)?;
-    if let Some(road) = &args.road {
-        scenario.road.clone_from(road);
-    }
-    TrafficChanges {
-        source: args.traffic.as_deref(),
+    let mut scenario = Scenario::named(&args.scenario).map_err(Failure::input)?;
+    let changes = Overrides {
+        road: args.road.as_deref(),
+        traffic: args.traffic.as_deref(),
         mode: args.mode.as_deref(),
         manifest: args.manifest.as_deref(),
-        on_failure: None,
-    }
-    .apply(&mut scenario)?;
+        ..Overrides::default()
+    };
+    changes.apply(&mut scenario).map_err(Failure::of_option)?;
     if scenario.traffic.mode() == Mode::Inter {
         scenario.traffic.mode = Some(Mode::Pure);
     }
-    let seed = seed(args.seed, &scenario)?;
+    let seed = scenario.seed(args.seed).map_err(Failure::input)?;
     // Read before anything is written: what cannot be used is refused at once.
     let read = |paths: &[PathBuf]| Measured::read(paths, args.lanes.into(), args.carriageway);
     let measured = read(&args.compare)?;

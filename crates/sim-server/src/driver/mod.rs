@@ -2,7 +2,6 @@
 
 mod control;
 mod pace;
-mod timing;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -10,33 +9,17 @@ use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use sim::{Status, World};
+use sim::{EndReason, Status, TickTime, TickTimes, World};
 use tractrix_core::{Recorder, Tick};
 
 pub(crate) use control::{Control, ControlSender, channel};
 pub(crate) use pace::Pace;
-pub(crate) use timing::TickTime;
 
 use self::pace::Pacer;
-use self::timing::TickTimes;
 use crate::dashboard::Publisher;
 use crate::failure::Failure;
 use crate::progress::Progress;
 use crate::recording::Recording;
-
-/// Why a run ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum EndReason {
-    /// The ego has reached the end of the road.
-    RoadEnd,
-    /// The scenario's duration is over.
-    TimeOver,
-    /// The user stopped it.
-    Interrupted,
-    /// The world or the recording failed.
-    Failed,
-}
 
 /// What a viewer is told about the run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -143,9 +126,11 @@ impl Drive {
                 continue;
             }
             match self.tick() {
-                Ok(Status::Running) => {}
-                Ok(Status::RoadEnd) => break EndReason::RoadEnd,
-                Ok(Status::TimeOver) => break EndReason::TimeOver,
+                Ok(status) => {
+                    if let Some(end) = status.end() {
+                        break end;
+                    }
+                }
                 Err(why) => {
                     failure = Some(why);
                     break EndReason::Failed;

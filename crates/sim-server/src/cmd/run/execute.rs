@@ -6,46 +6,17 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use serde::Serialize;
-use sim::{Scenario, Summary, World};
+use sim::{RunReport, Scenario, WallClock, World};
 use tractrix_core::Vehicle;
-use traffic_client::Mode;
 
 use super::Args;
 use crate::dashboard::{self, Dashboard, Publisher, Shared};
-use crate::driver::{self, ControlSender, EndReason, Ended, Job, Pace, TickTime, drive};
+use crate::driver::{self, ControlSender, Ended, Job, Pace, drive};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Progress;
 use crate::provenance::{GIT_REVISION, Provenance, VERSION};
 use crate::recording::{Combination, Recording, RunHeader};
-
-/// `summary.json`.
-#[derive(Debug, Serialize)]
-struct RunSummary {
-    #[serde(flatten)]
-    provenance: Provenance,
-    scenario: String,
-    end_reason: EndReason,
-    traffic: TrafficSummary,
-    #[serde(flatten)]
-    summary: Summary,
-    missed_deadlines: u64,
-    tick_time_us: TickTime,
-    pace: Pace,
-    wall_time_s: f64,
-    realtime_factor: f64,
-}
-
-/// Where the other vehicles came from.
-#[derive(Debug, Serialize)]
-struct TrafficSummary {
-    /// Engine and version.
-    engine: String,
-    mode: Mode,
-    /// Why the native engine went on in its place.
-    failure: Option<String>,
-}
 
 /// Longest report that the dashboard serves.
 const MAX_REPORT_BYTES: u64 = 64 << 20;
@@ -91,7 +62,7 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     }
     let keep_open = args.keep_open;
     let ended = runtime.block_on(wait_for_end(job, stop, controls))?;
-    let result = finish(ended, provenance, scenario, pace, &folder);
+    let result = finish(ended, provenance, pace, &folder);
     if !args.headless {
         runtime.block_on(async {
             tokio::time::sleep(LAST_FRAME_TIME).await;
@@ -192,28 +163,16 @@ async fn stop_signal() {
 fn finish(
     ended: Ended,
     provenance: Provenance,
-    scenario: &Scenario,
     pace: Pace,
     folder: &Path,
-) -> Result<(RunSummary, String), Failure> {
-    let figures = ended.world.summary();
-    let manifest = ended.world.traffic().manifest();
-    let summary = RunSummary {
-        provenance,
-        scenario: scenario.name.clone(),
-        end_reason: ended.reason,
-        traffic: TrafficSummary {
-            engine: manifest.engine.clone(),
-            mode: ended.world.traffic().mode(),
-            failure: ended.world.traffic().failure().map(str::to_owned),
-        },
+) -> Result<(RunReport, String), Failure> {
+    let wall = WallClock {
         missed_deadlines: ended.missed_deadlines,
         tick_time_us: ended.tick_time_us,
-        pace,
+        pace: pace.to_string(),
         wall_time_s: ended.wall_time_s,
-        realtime_factor: figures.duration_s / ended.wall_time_s.max(1e-9),
-        summary: figures,
     };
+    let summary = RunReport::new(provenance.into(), &ended.world, Some(ended.reason), wall);
     let json = serde_json::to_string_pretty(&summary).map_err(Failure::work)?;
     if let Some(publisher) = &ended.publisher {
         publisher.publish_summary(&json);
@@ -223,7 +182,7 @@ fn finish(
     std::fs::write(&path, &json).map_err(|e| Failure::work_on(&path, &e))?;
     recorded?;
     let path = folder.join("traffic.manifest.toml");
-    let text = manifest.to_toml().map_err(Failure::work)?;
+    let text = ended.world.traffic().manifest().to_toml().map_err(Failure::work)?;
     std::fs::write(&path, text).map_err(|e| Failure::work_on(&path, &e))?;
     if let Some(why) = ended.world.traffic().failure() {
         output::note(&format!("traffic: {why}; the native engine went on"));
@@ -235,7 +194,7 @@ fn finish(
 }
 
 /// The result on stdout.
-fn report(as_json: bool, run: &RunSummary, json: &str, folder: &Path) {
+fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) {
     if as_json {
         return output::result(json);
     }

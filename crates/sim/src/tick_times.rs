@@ -1,4 +1,4 @@
-//! How long ticks take on the wall clock.
+//! How long ticks take on the wall clock of the shell that measures them.
 
 use std::time::Duration;
 
@@ -7,41 +7,50 @@ use serde::Serialize;
 
 /// Wall time of a tick, µs, recording hand-over included.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub(crate) struct TickTime {
+pub struct TickTime {
     /// Median.
-    pub(crate) p50: f64,
+    pub p50: f64,
     /// 99th percentile.
-    pub(crate) p99: f64,
+    pub p99: f64,
     /// Longest.
-    pub(crate) max: f64,
+    pub max: f64,
 }
 
 /// Longer ticks count as this long, ns: one hour.
 const LONGEST_NS: u64 = 3_600_000_000_000;
 
 /// Collects tick times with three significant digits.
-pub(crate) struct TickTimes(Histogram<u64>);
+#[derive(Debug, Clone)]
+pub struct TickTimes(Histogram<u64>);
 
 impl TickTimes {
     /// Nothing collected.
+    #[must_use]
     #[expect(clippy::expect_used, reason = "constant bounds that the crate accepts")]
-    pub(crate) fn new() -> Self {
+    pub fn new() -> Self {
         Self(Histogram::new_with_bounds(1, LONGEST_NS, 3).expect("valid bounds"))
     }
 
     /// Adds one tick.
-    pub(crate) fn add(&mut self, time: Duration) {
+    pub fn add(&mut self, time: Duration) {
         self.0.saturating_record(u64::try_from(time.as_nanos()).unwrap_or(u64::MAX));
     }
 
     /// The figures; zero when nothing was collected.
-    pub(crate) fn tick_time_us(&self) -> TickTime {
+    #[must_use]
+    pub fn tick_time_us(&self) -> TickTime {
         let us = |ns: u64| ns as f64 * 1e-3;
         TickTime {
             p50: us(self.0.value_at_quantile(0.5)),
             p99: us(self.0.value_at_quantile(0.99)),
             max: us(self.0.max()),
         }
+    }
+}
+
+impl Default for TickTimes {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
