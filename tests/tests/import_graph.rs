@@ -15,6 +15,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("sim", plant.clone()),
         ("diagnosis", vec!["tractrix-core", "road", "dynamics", "j1939"]),
         ("truck-node", vec!["tractrix-core", "road", "planner", "j1939"]),
+        ("tractrix-python", [&plant[..], &["sim", "diagnosis"]].concat()),
         ("sim-server", [plant, vec!["sim", "diagnosis"]].concat()),
     ])
 }

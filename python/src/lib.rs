@@ -1,0 +1,31 @@
+//! The native half of the Python package `tractrix`.
+//!
+//! The package's Python modules are what users see; this crate turns their calls into calls of
+//! [`sim`] and the results into plain Python objects: numbers, words, dictionaries, JSON text, and
+//! bytes that NumPy reads as a table. The only crate that knows PyO3. As a shell it reads the clock,
+//! to measure ticks and to let Python look at signals.
+//!
+//! Left out on purpose: everything that can be said in Python without loss.
+
+mod decision;
+mod ego;
+mod fault;
+mod scenario;
+mod scene;
+mod world;
+
+/// What `tractrix` is made of; not to be imported by users.
+#[pyo3::pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::scenario::{scenario_json, scenario_list};
+    #[pymodule_export]
+    use crate::world::{Snapshot, World};
+
+    #[pymodule_init]
+    fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        use pyo3::types::PyModuleMethods as _;
+        module.add("VERSION", env!("CARGO_PKG_VERSION"))?;
+        module.add("GIT_REVISION", env!("TRACTRIX_GIT_REVISION"))
+    }
+}

@@ -1,0 +1,28 @@
+"""Heavy highway trucks in closed loop: every traffic mode and engine of Tractrix from Python.
+
+    with tractrix.World("dense-15", seed=3) as world:
+        world.step(1000)
+        print(world.ego.speed_m_s, world.scene()["front_s_m"])
+
+Units are in the names. Axes are those of ISO 8855: x forward, y left, z up, yaw counter-clockwise.
+Road frame: s along the route, d to the left of its reference line. The ego's reference point is the
+centre of the tractor's drive-axle group, on the ground.
+"""
+
+from tractrix._native import GIT_REVISION as __git_revision__
+from tractrix._native import VERSION as __version__
+from tractrix._scenario import scenario, scenarios
+from tractrix._state import SCENE_DTYPE, Decision, Ego
+from tractrix._world import Snapshot, World
+
+__all__ = [
+    "SCENE_DTYPE",
+    "Decision",
+    "Ego",
+    "Snapshot",
+    "World",
+    "__git_revision__",
+    "__version__",
+    "scenario",
+    "scenarios",
+]
