@@ -11,9 +11,10 @@ centre of the tractor's drive-axle group, on the ground.
 
 from tractrix._native import GIT_REVISION as __git_revision__
 from tractrix._native import VERSION as __version__
+from tractrix._native import Snapshot
 from tractrix._scenario import scenario, scenarios
 from tractrix._state import SCENE_DTYPE, Decision, Ego
-from tractrix._world import Snapshot, World
+from tractrix._world import World
 
 __all__ = [
     "SCENE_DTYPE",

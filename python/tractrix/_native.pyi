@@ -1,5 +1,7 @@
 """The native half of the package; see `python/src`. Not for users."""
 
+from typing import Self
+
 VERSION: str
 GIT_REVISION: str
 
@@ -25,7 +27,7 @@ class World:
         decider: str | None,
         speed_planner: str | None,
         duration_s: float | None,
-    ) -> World: ...
+    ) -> Self: ...
     def step(self, ticks: int) -> str: ...
     def status(self) -> str: ...
     def time_s(self) -> float: ...

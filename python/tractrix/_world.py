@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from tractrix import _native
-from tractrix._native import Snapshot
 from tractrix._state import SCENE_DTYPE, Decision, Ego
 
 _MAX_U64 = 2**64 - 1
@@ -67,10 +66,13 @@ class World:
         speed_planner: str | None = None,
         duration_s: float | None = None,
     ) -> None:
-        named = not isinstance(scenario, Mapping)
+        if isinstance(scenario, Mapping):
+            name, keys = "", json.dumps(dict(scenario))
+        else:
+            name, keys = os.fspath(scenario), None
         self._native = _native.World(
-            os.fspath(scenario) if named else "",
-            None if named else json.dumps(scenario),
+            name,
+            keys,
             seed=None if seed is None else _whole("seed", seed),
             road=_path(road),
             truck=_path(truck),
@@ -170,14 +172,14 @@ class World:
         """
         self._native.request_lane_change(to)
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> _native.Snapshot:
         """The whole state of the run, to go back to with `restore`.
 
         Raises `RuntimeError` in SUMO traffic: there is one SUMO.
         """
         return self._native.snapshot()
 
-    def restore(self, snapshot: Snapshot) -> None:
+    def restore(self, snapshot: _native.Snapshot) -> None:
         """Goes back to a snapshot, of this world or another; it goes on bit for bit from there."""
         self._native.restore(snapshot)
 
