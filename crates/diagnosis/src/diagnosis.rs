@@ -8,7 +8,7 @@ use crate::hypothesis::{CATALOGUE, CauseKind};
 use crate::problem::{Problem, Reference};
 use crate::replay::{Module, Prepared};
 use crate::report_models::Models;
-use crate::search::Fit;
+use crate::search::{Fit, MIN_EVIDENCE};
 use crate::sentence;
 use crate::sure::{Sure, judge};
 use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Plant};
@@ -216,6 +216,18 @@ pub struct Baseline {
 }
 
 impl Baseline {
+    /// Error of the speed of drives over free runs of 60 s with the truck file and the timing of
+    /// this baseline, m/s.
+    #[must_use]
+    pub fn speed_rmse_m_s<'d>(
+        &self,
+        plant: &Plant,
+        drives: impl Iterator<Item = &'d crate::Drive>,
+    ) -> f64 {
+        let of = |d| drive_error(&Prepared::new(d, plant), plant, &self.reference.theta).speed;
+        rms(drives.map(of))
+    }
+
     /// Learns from `drives` of the truck of `plant`; serves any number of diagnoses.
     ///
     /// # Errors
@@ -291,7 +303,11 @@ pub fn diagnose_with(
     let fit = problem.gate(fit, &empty);
     progress(Progress::Unknown);
     let (fit, shape, sure) = judge(&problem, &empty, fit);
-    let causes = causes(&problem, &fit, &empty, &open);
+    let mut causes = causes(&problem, &fit, &empty, &open);
+    let weak = |c: &(Cause, bool)| c.1 && c.0.evidence < MIN_EVIDENCE;
+    let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);
+    let fit = if faint { empty } else { fit };
+    causes.retain(|_| !faint);
     let verdict = if sure == Sure::Outside {
         Verdict::Unknown
     } else if fit.set.is_empty() {

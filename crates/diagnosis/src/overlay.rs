@@ -58,7 +58,7 @@ enum Carry {
     Retarder,
     /// Force per brake demand.
     BrakeDemand,
-    /// The simulator does it without being told.
+    /// The simulator does it without being told, or another parameter stands for it.
     Implied,
     /// Nothing carries it.
     Nowhere(&'static str),
@@ -98,6 +98,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
             Nowhere("the truck file has no derating by coolant temperature")
         }
         ("turbo_lag", "lag_s") => Plus("engine.slow_lag_s", 1.0),
+        ("turbo_lag", "threshold_offset_frac") => Plus("engine.lag_threshold_frac", 1.0),
         ("pedal_delay", "delay_s") => Plus("engine.pedal_delay_s", 1.0),
         ("shift_duration", "extra_time_s") => Carry::Shift,
         ("fuel_map_low_load", "extra_frac") => Plus("engine.fuel.low_load_extra_frac", 1.0),
@@ -117,6 +118,8 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("steering_offset", "offset_rad") => Plus("lateral.steering.offset_rad", 1.0),
         ("steering_free_play", "free_play_rad") => Plus("lateral.steering.free_play_rad", 1.0),
         ("steering_lag", "lag_s") => Plus("lateral.steering.lag_s", 1.0),
+        // The truck file's lag carries the sum of lag and dead time.
+        ("steering_lag", "pure_delay_frac") => Carry::Implied,
         ("cornering_stiffness_front", "stiffness_scale") => {
             Times("lateral.tyres.stiffness_scale[0]")
         }

@@ -70,10 +70,12 @@ pub(crate) enum P {
     FanWidth,
     StiffnessFollows,
     StiffnessFollowsMass,
+    TurboStart,
+    SteerDelay,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 61;
+pub(crate) const PARAMS: usize = 63;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -176,6 +178,8 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::FanWidth, "hysteresis_k", "K", (3.0, 0.0, 12.0, 0.5), 0.0, 0.0),
     s(P::StiffnessFollows, "stiffness_follows_load", "1", (1.0, 0.0, 1.0, 0.1), 0.0, 0.0),
     s(P::StiffnessFollowsMass, "stiffness_follows_load", "1", (1.0, 0.0, 1.0, 0.1), 0.0, 0.0),
+    s(P::TurboStart, "threshold_offset_frac", "1", (0.1, -0.3, 0.4, 0.02), 0.0, 0.0),
+    s(P::SteerDelay, "pure_delay_frac", "1", (0.5, 0.0, 1.0, 0.1), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -200,6 +204,8 @@ impl Spec {
                 | P::FadeStart
                 | P::StiffnessFollows
                 | P::StiffnessFollowsMass
+                | P::TurboStart
+                | P::SteerDelay
         )
     }
 }

@@ -22,6 +22,14 @@ const LEFT_OVER: f64 = 0.08;
 const REPLACED_ONE: f64 = 1.0;
 const REPLACED_MANY: f64 = 0.5;
 
+/// Evidence of the causes and of the best free function that is left beside them, in that of the
+/// best one without causes, above which they are about different things: both are stated.
+const BESIDE: f64 = 1.5;
+
+/// Part of the evidence of the best free function that may be left beside causes that account for
+/// it: a function takes a steady force along, which tolerances and their means share with a cause.
+const ACCOUNTED: f64 = 0.2;
+
 /// Variance over that of drives in order, in a module that a cause explains, above which the cause
 /// is not sure.
 const MISFIT: f64 = 1.2;
@@ -54,12 +62,19 @@ pub(crate) fn judge(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Optio
     {
         return (empty.clone(), Some(noise(&random)), Sure::Outside);
     }
-    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
-        return (empty.clone(), describe(&bare), Sure::Outside);
-    }
     let rest =
         if fit.set.is_empty() { bare.clone() } else { beyond(problem, problem.shapes(&fit.theta)) };
     let left = rest.first().map_or(0.0, |s| s.firm);
+    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
+        let best_rest = rest.first().map_or(0.0, |s| s.log_z);
+        if !fit.set.is_empty() && fit.log_z + best_rest > BESIDE * best_bare {
+            return (fit, describe(&rest), Sure::Outside);
+        }
+        let accounted = left < UNKNOWN_EVIDENCE && best_rest < ACCOUNTED * best_bare;
+        if fit.set.is_empty() || !accounted {
+            return (empty.clone(), describe(&bare), Sure::Outside);
+        }
+    }
     if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
         let share = rest.first().map_or(0, |s| sharing(&fit, s.module));
         // Causes that leave much and that one free function replaces stand in for it.

@@ -53,6 +53,17 @@ fn slow_shifts_and_soft_trailer_tyres_are_named_together_with_their_sizes() {
     }
 }
 
+#[test]
+fn a_dead_time_of_the_steering_has_the_size_of_a_lag() {
+    // The middle of the generator's three forms is a pure dead time.
+    let d = judge(&drives(&[cause("steering_lag", 0.12)], 29)).unwrap();
+    let ids: Vec<&str> = d.causes.iter().map(|c| c.id).collect();
+    assert_eq!(ids, ["steering_lag"], "{:?}", d.verdict);
+    let (lag, form) = (d.causes[0].parameters["lag_s"], d.causes[0].parameters["pure_delay_frac"]);
+    assert!((lag.value - 0.12).abs() < 3.0 * lag.sigma, "{lag:?}");
+    assert!(form.value > 0.5, "{form:?}");
+}
+
 /// Shifts are events, not samples; torque that fades is a factor, not an addition; a receiver that
 /// drops out follows nothing, although every signal explains a little of so much noise.
 #[test]

@@ -6,7 +6,7 @@ use tractrix_core::GRAVITY_M_S2;
 
 use super::Module as M;
 use super::force::{BLOCK, SideForce};
-use super::prepared::Prepared;
+use super::prepared::{Prepared, at_index};
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -158,6 +158,8 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
 /// Road-wheel angle of sample after sample: dead time, free play, offset, ratio, lag.
 struct RoadWheel<'a> {
     steer: &'a [f64],
+    /// Dead time, samples.
+    delay: f64,
     /// What is left of the angle after a sample, and the shares of the targets at its begin and end.
     keep: f64,
     shares: [f64; 2],
@@ -172,7 +174,9 @@ struct RoadWheel<'a> {
 impl<'a> RoadWheel<'a> {
     fn new(d: &'a Prepared, plant: &Plant, t: &Theta) -> Self {
         let steering = &plant.lateral.steering;
-        let lag = steering.lag_s + t[P::SteerLag as usize];
+        // What delays the wheels on top may be a lag or a dead time: the size is their sum.
+        let dead_s = (t[P::SteerDelay as usize] * t[P::SteerLag as usize]).max(0.0);
+        let lag = steering.lag_s + t[P::SteerLag as usize] - dead_s;
         let ratio = steering.ratio * (1.0 + t[P::SteerRatio as usize]);
         let offset = steering.offset_rad + t[P::SteerOffset as usize];
         let gear = d.steer[0];
@@ -180,6 +184,7 @@ impl<'a> RoadWheel<'a> {
         let (keep, shares) = first_order_hold(lag);
         Self {
             steer: &d.steer,
+            delay: dead_s / Drive::STEP_S,
             keep,
             shares,
             ratio,
@@ -193,7 +198,11 @@ impl<'a> RoadWheel<'a> {
 
     #[inline(always)]
     fn step(&mut self, i: usize) -> f64 {
-        let wheel = self.steer[i];
+        let wheel = if self.delay > 0.0 {
+            at_index(self.steer, i as f64 - self.delay)
+        } else {
+            self.steer[i]
+        };
         self.gear = self.gear.clamp(wheel - self.play, wheel + self.play);
         let before = self.target;
         self.target = (self.gear - self.offset) / self.ratio;

@@ -184,6 +184,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::HeatCoolant
         | P::HeatCoolantStart
         | P::TurboLag
+        | P::TurboStart
         | P::PedalDelay
         | P::TorqueReport => &[G::Torque],
         P::ShiftTime => &[G::Shift],
@@ -195,6 +196,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::SteerOffset
         | P::FreePlay
         | P::SteerLag
+        | P::SteerDelay
         | P::CFront
         | P::CDrive
         | P::CTrailer

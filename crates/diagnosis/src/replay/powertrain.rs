@@ -19,6 +19,7 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
         fast_s: file.fast_lag_s,
         slow_s: (file.slow_lag_s + t[P::TurboLag as usize]).max(0.02),
     };
+    let from = (file.lag_threshold_frac + t[P::TurboStart as usize]).max(0.0);
     let keep = [rise.fast_s, rise.slow_s].map(|lag| (-Drive::STEP_S / lag).exp());
     let percent = 100.0 / file.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
     let pedal = d.profiles.get(Kind::Pedal, [delay, 0.0], || {
@@ -43,11 +44,12 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
             let n = d.turning[i];
             let full = d.full_load[i] * if derates { derate(d, t, i) } else { 1.0 };
             let demand = engine.governed_nm(engine.pedal_demand_nm(pedal[i], n, full), n, full);
-            let threshold = file.lag_threshold_frac * full;
+            let threshold = from * full;
             torque = if torque < threshold && threshold < demand {
                 rise.across(torque, demand, threshold, keep[0])
             } else {
-                demand + (torque - demand) * keep[usize::from(engine.boosts(torque, demand, full))]
+                demand
+                    + (torque - demand) * keep[usize::from(demand > torque && torque >= threshold)]
             };
             out[k] += 0.5 * (d.torque[i] - torque.max(0.0) * percent);
         }

@@ -90,7 +90,7 @@ pub(crate) fn drive(
     let mut lateral: State = [0.0; 4];
     let (mut gear_rad, mut delta, mut offset) = (0.0_f64, 0.0_f64, 0.0_f64);
     let (mut pressure, mut brake_k, mut coolant) = (0.0_f64, 0.0_f64, 80.0_f64);
-    let (mut pedals, mut demands) = (Delay::new(), Delay::new());
+    let (mut pedals, mut demands, mut wheels) = (Delay::new(), Delay::new(), Delay::new());
     let mut memory = Memory::default();
     for i in 0..samples * 5 {
         let time_s = i as f64 * STEP_S;
@@ -167,7 +167,8 @@ pub(crate) fn drive(
             / (mass + rotating / (RADIUS_M * RADIUS_M));
         // Across the road.
         let half = 0.5 * f.free_play_rad;
-        gear_rad = gear_rad.clamp(driver.wheel - half, driver.wheel + half);
+        let wheel = wheels.put(driver.wheel, f.steer_delay_s);
+        gear_rad = gear_rad.clamp(wheel - half, wheel + half);
         let target = (gear_rad - f.steer_offset_rad) / f.steer_ratio;
         delta += (target - delta) * (1.0 - (-STEP_S / f.steer_lag_s.max(0.01)).exp());
         let rolled = v.max(3.0);

@@ -117,7 +117,10 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
             "driveline_loss" => f.efficiency *= 1.0 - x,
             "dragging_brake" => f.drag_force_n += x,
             "engine_friction" => f.friction_scale *= 1.0 + x,
-            "turbo_lag" => f.boost_lag_s += x,
+            "turbo_lag" => {
+                f.boost_lag_s += x;
+                f.boost_from = shape.at(0, 0.27, 0.43);
+            }
             "pedal_delay" => f.pedal_delay_s += x,
             "shift_duration" => f.shift_extra_s += x,
             "brake_gain" => f.brake_scale *= 1.0 + x,
@@ -127,7 +130,14 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
             "steering_ratio" => f.steer_ratio *= 1.0 + x,
             "steering_offset" => f.steer_offset_rad += x,
             "steering_free_play" => f.free_play_rad += x,
-            "steering_lag" => f.steer_lag_s += x,
+            "steering_lag" => match shape.choice(0, 3) {
+                0 => f.steer_lag_s += x,
+                1 => f.steer_delay_s += x,
+                _ => {
+                    f.steer_lag_s += 0.5 * x;
+                    f.steer_delay_s += 0.5 * x;
+                }
+            },
             "cornering_stiffness_front" => f.stiffness[0] *= 1.0 + x,
             "cornering_stiffness_drive" => f.stiffness[1] *= 1.0 + x,
             "cornering_stiffness_trailer" => f.stiffness[2] *= 1.0 + x,

@@ -123,7 +123,7 @@ impl Drivetrain {
     pub(crate) fn fuel_up(&mut self, f: &Figures, pedal: f64, derate: f64, demand: f64, dt: f64) {
         let full = full_load(self.rpm) * derate;
         let wanted = pedal * (full + friction(self.rpm)) * demand * self.closed();
-        let lag = if wanted > self.indicated_nm && self.indicated_nm > 0.35 * full {
+        let lag = if wanted > self.indicated_nm && self.indicated_nm > f.boost_from * full {
             f.boost_lag_s
         } else {
             0.15

@@ -65,6 +65,8 @@ pub(crate) struct Figures {
     pub(crate) friction_scale: f64,
     pub(crate) auxiliary_w: f64,
     pub(crate) boost_lag_s: f64,
+    /// Part of the full load above which it acts.
+    pub(crate) boost_from: f64,
     pub(crate) pedal_delay_s: f64,
     pub(crate) shift_extra_s: f64,
     pub(crate) brake_scale: f64,
@@ -81,6 +83,8 @@ pub(crate) struct Figures {
     pub(crate) steer_offset_rad: f64,
     pub(crate) free_play_rad: f64,
     pub(crate) steer_lag_s: f64,
+    /// Dead time of the steering, s.
+    pub(crate) steer_delay_s: f64,
     pub(crate) bank_rad: f64,
     pub(crate) headwind: f64,
     pub(crate) crosswind: f64,
@@ -102,6 +106,7 @@ impl Figures {
         friction_scale: 1.0,
         auxiliary_w: 4000.0,
         boost_lag_s: 0.45,
+        boost_from: 0.35,
         pedal_delay_s: 0.05,
         shift_extra_s: 0.0,
         brake_scale: 1.0,
@@ -117,6 +122,7 @@ impl Figures {
         steer_offset_rad: 0.0,
         free_play_rad: 0.0,
         steer_lag_s: 0.08,
+        steer_delay_s: 0.0,
         bank_rad: 0.0,
         headwind: 0.0,
         crosswind: 0.0,

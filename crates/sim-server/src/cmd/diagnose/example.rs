@@ -38,6 +38,9 @@ const CAUSES: [&str; 8] = [
 /// Drives with the hidden effect, and drives in order.
 const DRIVES: usize = 8;
 const CLEAN_DRIVES: usize = 4;
+/// Least payload of a truck that is lighter than modelled, in what it lacks: room for the scatter of
+/// the load.
+const SPARE: f64 = 1.25;
 /// Payload of the trip that closes the loop, kg.
 const TRIP_PAYLOAD_KG: f64 = 36_000.0;
 /// Spacing of the trip's samples, m.
@@ -136,9 +139,14 @@ fn one_drive(
     truck.instruments.yaw_rate_bias_rad_s += draw.normal(2e-4);
     let mut sheet = truck.clone();
     sheet.instruments.mass_scale_coeff = 1.0;
-    let reported = TruckModel::new(sheet, payload_kg).map_err(Failure::work)?.mass_kg();
+    let of_sheet = |payload_kg| TruckModel::new(sheet.clone(), payload_kg).map_err(Failure::work);
+    // A load sheet that says too much leaves something to carry.
+    let tare_kg = of_sheet(0.0)?.mass_kg();
+    let least_kg = tare_kg * (1.0 / truck.instruments.mass_scale_coeff - 1.0).max(0.0);
+    let payload_kg = payload_kg.max(least_kg * SPARE);
+    let reported = of_sheet(payload_kg)?.mass_kg();
     scenario.truck.payload_kg = payload_kg + draw.normal(0.004) * reported;
-    scenario.truck.payload_kg = scenario.truck.payload_kg.max(0.0);
+    scenario.truck.payload_kg = scenario.truck.payload_kg.max(least_kg);
     drive(name, &scenario, road, &truck, reported, seed)
 }
 
