@@ -104,6 +104,20 @@ fn without_sumo_the_line_says_how_to_get_it_and_nothing_is_written() {
     assert!(!out.exists());
 }
 
+#[test]
+fn a_sumo_that_is_named_but_not_there_is_not_replaced_by_another_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = program()
+        .env("SUMO_BINARY", "/nowhere/sumo")
+        .args(["run", "--headless", "--duration", "1", "--traffic", "sumo", "--out"])
+        .arg(folder.path().join("out"))
+        .output()
+        .unwrap();
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{line}");
+    assert!(line.contains("/nowhere/sumo"), "{line}");
+}
+
 /// Process id of the child that a process has started.
 fn child_of(pid: u32) -> Option<u32> {
     std::fs::read_dir("/proc").unwrap().flatten().find_map(|entry| {

@@ -77,6 +77,17 @@ fn traffic_is_like_itself_with_another_seed_and_unlike_denser_traffic() {
         (number(&s, &["distances", "speed_m_s", "ks"]), number(&s, &["distances", "gap_m", "ks"]))
     };
     let (same, other, dense) = (ks("sparse-15", "1"), ks("sparse-15", "2"), ks("dense-15", "1"));
+    let kinds = |scenario: &str| {
+        let file = folder.path().join(scenario).join("statistics.json");
+        let s: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+        let kinds = s["comparisons"].as_array().unwrap();
+        assert_eq!((&kinds[0]["kind"], &kinds[1]["kind"]), (&"free".into(), &"bounded".into()));
+        assert_eq!(kinds[0]["ks_of_speed"], s["distances"]["speed_m_s"]["ks"]);
+        assert_eq!(kinds[1]["ks_of_speed"], s["bounded"]["distances"]["speed_m_s"]["ks"]);
+        assert!(kinds.iter().all(|k| k["definition"].as_str().unwrap().len() > 40));
+        kinds[0]["within_bound"].as_bool().unwrap()
+    };
+    assert!(kinds("sparse-15-1") && !kinds("dense-15-1"));
     assert!(same.0 < 0.02 && same.1 < 0.05, "its own trajectories: {same:?}");
     assert!(other.0 < 0.3, "{other:?}");
     assert!(dense.1 > 0.5, "{dense:?}");
@@ -144,5 +155,6 @@ fn what_cannot_be_read_is_refused_before_anything_is_written() {
     assert!(line(&["--duration", "-3"]).contains("-3"));
     assert!(line(&["--lanes", "0"]).contains("--lanes"));
     assert!(line(&["--mode", "rep"]).contains("replay:FILE"));
+    assert!(line(&["--road", "recording:2"]).contains("traffic.replay.file"));
     assert!(!Path::new(&out).exists());
 }

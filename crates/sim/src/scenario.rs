@@ -240,6 +240,10 @@ impl Scenario {
             name: self.name.clone(),
             why: format!("road = {:?}: the number of lanes is missing", self.road),
         })?;
+        if self.traffic.replay.file.is_none() {
+            let why = format!("road = {:?} needs a recording: traffic.replay.file", self.road);
+            return Err(SimError::Scenario { name: self.name.clone(), why });
+        }
         let recording = crate::traffic::recording_of(self)?;
         traffic_client::replay::road_of(&recording, lanes, RECORDED_LIMIT_M_S)
             .map_err(|e| traffic_client::TrafficError::from(e).into())

@@ -217,6 +217,7 @@ mod tests {
                         id: (k + 100) as u64,
                         front_s_m,
                         rear_s_m: front_s_m - 5.0,
+                        speed_m_s: 15.0,
                         ..Neighbour::default()
                     }
                 })
@@ -257,6 +258,8 @@ mod tests {
         assert_eq!(near.neighbours.len(), 5);
         let ahead = &see(PerceptionConfig { field_of_view_rad: 1.0, ..clear() }, 1)[0];
         assert!(ahead.neighbours.iter().all(|n| n.front_s_m >= 0.0));
+        // The one alongside and the ten within 200 m ahead.
+        assert_eq!(ahead.neighbours.len(), 11);
     }
 
     #[test]
@@ -283,6 +286,42 @@ mod tests {
         assert!((sigma - 0.5).abs() < 0.03, "{sigma}");
         assert_eq!(see(config.clone(), 500), scenes);
         assert_ne!(see(PerceptionConfig { seed: 2, ..config }, 500), scenes);
+    }
+
+    #[test]
+    fn speed_and_offset_have_noise_of_their_own_sizes() {
+        let config = PerceptionConfig {
+            speed_sigma_m_s: 0.4,
+            lateral_sigma_m: 0.2,
+            range_m: 1e4,
+            ..clear()
+        };
+        let scenes = see(config, 500);
+        let sigma = |of: fn(&Neighbour) -> f64| {
+            let all: Vec<f64> = scenes.iter().flat_map(|s| &s.neighbours).map(of).collect();
+            (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt()
+        };
+        let (speed, offset) = (sigma(|n| n.speed_m_s - 15.0), sigma(|n| n.d_m));
+        assert!((speed - 0.4).abs() < 0.02, "{speed}");
+        assert!((offset - 0.2).abs() < 0.01, "{offset}");
+        assert!(sigma(|n| n.y_m - n.d_m) < 1e-12, "the map position moves with the offset");
+        let along = |n: &Neighbour| n.front_s_m - n.rear_s_m - 5.0;
+        assert!(sigma(along) < 1e-12, "the length stays");
+    }
+
+    #[test]
+    fn a_wrong_class_is_as_frequent_as_asked_for_and_stays_with_its_vehicle() {
+        let of = |wrong_class_frac, seed| {
+            let config = PerceptionConfig { wrong_class_frac, seed, range_m: 1e4, ..clear() };
+            let scenes = see(config, 20);
+            let classes = |s: &Scene| s.neighbours.iter().map(|n| n.class).collect::<Vec<_>>();
+            let first = classes(&scenes[0]);
+            assert!(scenes.iter().all(|s| classes(s) == first), "classes do not flicker");
+            first.iter().filter(|&&class| class != VehicleClass::Car).count()
+        };
+        assert_eq!((of(0.0, 1), of(1.0, 1)), (0, 41));
+        let third: usize = (0..50).map(|seed| of(0.3, seed)).sum();
+        assert!((third as f64 / (50.0 * 41.0) - 0.3).abs() < 0.03, "{third}");
     }
 
     #[test]

@@ -20,6 +20,8 @@ pub(crate) enum Stream {
     Outflow = 5,
     /// Search for parameters; index = trial, number = which draw of it.
     Search = 6,
+    /// Speed before the start of the road; index = period, number = lane track.
+    Inflow = 7,
 }
 
 const M0: u64 = 0xD251_1F53;

@@ -122,6 +122,15 @@ fn a_recording_survives_parquet() {
 }
 
 #[test]
+fn an_empty_file_is_said_to_be_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("nothing.csv");
+    std::fs::write(&file, " \n").unwrap();
+    let e = load(&file, Carriageway::Forward, 0.1).unwrap_err().to_string();
+    assert!(e.contains("nothing.csv: the file is empty"), "{e}");
+}
+
+#[test]
 fn recorded_stretches_get_their_own_road_and_replay_without_jumps() {
     let Some(file) = shared("traffic_recorded/mapped_Middle_sample1.csv.gz") else { return };
     let recording = load(&file, Carriageway::Forward, 0.1).unwrap();

@@ -88,12 +88,17 @@ pub struct TrafficConfig {
     pub mandatory_ahead_m: f64,
     /// Braking that a driver accepts to let another one merge, m/s².
     pub yield_decel_m_s2: f64,
+    /// Mean speed at which traffic comes in at the start of the road, m/s, where a queue before it
+    /// sets it. `None`: everyone comes at their desired speed.
+    pub inflow_speed_m_s: Option<f64>,
+    /// Standard deviation of that speed, m/s; it changes as that of the outflow does.
+    pub inflow_sigma_m_s: f64,
     /// Mean speed of the traffic beyond the end of the road, m/s: what congestion comes from.
     /// `None`: the road goes on free.
     pub outflow_speed_m_s: Option<f64>,
     /// Standard deviation of that speed, m/s; it changes from lane to lane and in time.
     pub outflow_sigma_m_s: f64,
-    /// Time between two independent draws of that speed, s; in between it goes over linearly.
+    /// Time between two independent draws of these speeds, s; in between they go over linearly.
     pub outflow_period_s: f64,
     /// Passenger cars.
     pub car: ClassConfig,
@@ -174,6 +179,8 @@ impl Default for TrafficConfig {
             sees_ego: true,
             mandatory_ahead_m: 800.0,
             yield_decel_m_s2: 1.5,
+            inflow_speed_m_s: None,
+            inflow_sigma_m_s: 0.0,
             outflow_speed_m_s: None,
             outflow_sigma_m_s: 0.0,
             outflow_period_s: 20.0,
@@ -274,6 +281,8 @@ impl TrafficConfig {
             ("scene_radius_m", self.scene_radius_m, 1.0, 100_000.0),
             ("mandatory_ahead_m", self.mandatory_ahead_m, 10.0, 10_000.0),
             ("yield_decel_m_s2", self.yield_decel_m_s2, 0.0, 5.0),
+            ("inflow_speed_m_s", self.inflow_speed_m_s.unwrap_or(1.0), 1.0, 70.0),
+            ("inflow_sigma_m_s", self.inflow_sigma_m_s, 0.0, 30.0),
             ("outflow_speed_m_s", self.outflow_speed_m_s.unwrap_or(0.0), 0.0, 70.0),
             ("outflow_sigma_m_s", self.outflow_sigma_m_s, 0.0, 30.0),
             ("outflow_period_s", self.outflow_period_s, 1.0, 3600.0),

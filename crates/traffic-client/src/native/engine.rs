@@ -15,7 +15,6 @@ use super::idm::{Idm, ballistic};
 use super::lanes::{LaneMap, NO_LANE};
 use super::mobil::{Change, Mobil};
 use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT};
-use crate::philox::{Draws, Stream};
 
 /// Length of a tick, s.
 pub(crate) const TICK_S: f64 = 0.1;
@@ -85,7 +84,7 @@ pub(crate) struct Engine {
     /// Stations at which changes into each lane began in this tick, m.
     begun_m: Vec<f64>,
     /// Speed beyond the end of the road per lane, m/s; empty where the road goes on free.
-    beyond_m_s: Vec<f64>,
+    pub(super) beyond_m_s: Vec<f64>,
     /// Measured traffic at the rim, in place of drawn arrivals.
     pub(crate) boundary: Option<Arc<Boundary>>,
     /// How other drivers expect the ego to follow.
@@ -171,26 +170,6 @@ impl Engine {
             wish_m_s = wish_m_s.min(beyond_m_s);
         }
         driver.idm.free_m_s2(fleet.v_m_s[i], wish_m_s)
-    }
-
-    /// The speed at which traffic moves beyond the end of the road at this tick, per lane.
-    fn look_beyond(&mut self) {
-        if let Some(boundary) = &self.boundary {
-            self.beyond_m_s.clear();
-            self.beyond_m_s.extend_from_slice(boundary.beyond_m_s(self.state.tick));
-            return;
-        }
-        let Some(mean_m_s) = self.config.outflow_speed_m_s else { return };
-        let (sigma_m_s, seed) = (self.config.outflow_sigma_m_s, self.config.seed);
-        let period = ((self.config.outflow_period_s / TICK_S) as u64).max(1);
-        let (k, rest) = (self.state.tick / period, self.state.tick % period);
-        let f = rest as f64 / period as f64;
-        self.beyond_m_s.clear();
-        for lane in 0..self.map.lanes.len() as u32 {
-            let draw = |k| mean_m_s + sigma_m_s * Draws::new(seed, Stream::Outflow, k).bell(lane);
-            let (from, to) = (draw(k), draw(k + 1));
-            self.beyond_m_s.push((from + f * (to - from)).max(0.0));
-        }
     }
 
     /// What the leader in `lane` takes away, m/s².

@@ -146,16 +146,30 @@ impl Engine {
         {
             ahead = Some((span.rear_m, self.ego.speed_m_s));
         }
+        let queued = match lane.usage {
+            LaneUse::Through => self.before_m_s(k),
+            _ => None,
+        };
+        let wished = queued.map_or(desired, |v| v.min(desired));
+        // Out of a queue nobody comes closer than they would follow: otherwise those who come in
+        // would brake, and the head of the queue would wander onto the road. The nearer the speed
+        // is to the desired one, the less of a queue it is, and comfortable braking is right.
+        let least_m_s2 = |v: f64| {
+            let braking = -driver.idm.decel_m_s2;
+            let part = queued.map_or(1.0, |_| v / desired.max(0.1));
+            let part = part * part * part * part;
+            part * braking - (1.0 - part) * driver.idm.free_m_s2(v, desired)
+        };
         let comfortable = |v: f64| match ahead {
             None => true,
             Some((rear_m, speed_m_s)) => {
                 let gap = rear_m - s_m;
                 gap > driver.idm.min_gap_m
-                    && driver.idm.interaction_m_s2(v, gap, v - speed_m_s) > -driver.idm.decel_m_s2
+                    && driver.idm.interaction_m_s2(v, gap, v - speed_m_s) > least_m_s2(v)
             }
         };
-        let matched = ahead.map_or(desired, |(_, v)| v.min(desired));
-        let Some(v_m_s) = [desired, matched].into_iter().find(|&v| comfortable(v)) else {
+        let matched = ahead.map_or(wished, |(_, v)| v.min(wished));
+        let Some(v_m_s) = [wished, matched].into_iter().find(|&v| comfortable(v)) else {
             return false;
         };
         self.state.fleet.insert(s_m, v_m_s, k, id, driver);

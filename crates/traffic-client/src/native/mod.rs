@@ -13,6 +13,7 @@ mod lanes;
 pub mod mobil;
 mod neighbours;
 mod publish;
+mod rim;
 mod source;
 
 pub use boundary::Boundary;

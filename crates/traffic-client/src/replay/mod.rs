@@ -46,7 +46,10 @@ pub enum ReplayError {
         why: String,
     },
     /// No vehicle of the recording lies on the road.
-    #[error("none of the {tracks} tracks of `{name}` lies on road `{road}`")]
+    #[error(
+        "none of the {tracks} tracks of `{name}` lies on road `{road}`; the road \
+         `recording:LANES` is laid under the recording"
+    )]
     NotOnRoad {
         /// Recording.
         name: String,
@@ -73,6 +76,9 @@ pub fn load(path: &Path, carriageway: Carriageway, step_s: f64) -> Result<Record
         (Frame::Map, read_parquet(path)?)
     } else {
         let bytes = read_file(path, lower.ends_with(".gz"))?;
+        if bytes.iter().all(u8::is_ascii_whitespace) {
+            return Err(ReplayError::Format { name, why: "the file is empty".to_owned() });
+        }
         if lower.trim_end_matches(".gz").ends_with(".xml") {
             let text = String::from_utf8(bytes)
                 .map_err(|e| ReplayError::Format { name: name.clone(), why: e.to_string() })?;

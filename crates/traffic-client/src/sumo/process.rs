@@ -29,18 +29,19 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Finds SUMO: the given path, `SUMO_BINARY`, `SUMO_HOME/bin/sumo`, the Python package
-    /// `eclipse-sumo`, the PATH.
+    /// Finds SUMO: the given path or that in `SUMO_BINARY`; if there is neither,
+    /// `SUMO_HOME/bin/sumo`, the Python package `eclipse-sumo`, the PATH.
     ///
     /// # Errors
     /// [`SumoError::NotFound`] says where it was looked for and how to get it.
     pub fn find(given: Option<&Path>) -> Result<Self, SumoError> {
         let mut tried = Vec::new();
         let mut candidates: Vec<PathBuf> = Vec::new();
-        if let Some(path) = given {
-            candidates.push(path.to_owned());
+        // Who names a program gets this one or an error, not another version.
+        if let Some(path) = given.map(Path::to_owned).or(environment("SUMO_BINARY").map(Into::into))
+        {
+            candidates.push(path);
         } else {
-            candidates.extend(environment("SUMO_BINARY").map(PathBuf::from));
             candidates.extend(environment("SUMO_HOME").map(|h| Path::new(&h).join("bin/sumo")));
             candidates.extend(python_home(Path::new("python3")).map(|h| h.join("bin/sumo")));
             let path = environment("PATH").unwrap_or_default();

@@ -29,6 +29,9 @@ pub(super) struct Report {
     /// All recordings together.
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<Figures>,
+    /// Which distances stand below, what each is of, and whether its speeds are near enough.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    comparisons: Vec<Comparison>,
     /// Simulated against measured, by quantity.
     #[serde(skip_serializing_if = "Option::is_none")]
     distances: Option<Distances>,
@@ -75,6 +78,80 @@ struct Figures {
     min_gap_m: f64,
     #[serde(flatten)]
     moments: BTreeMap<&'static str, Moments>,
+}
+
+/// What traffic was compared with the recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum Kind {
+    Free,
+    Bounded,
+    Replayed,
+}
+
+/// One kind of comparison in words, and its verdict on the speeds.
+#[derive(Debug, Serialize)]
+struct Comparison {
+    kind: Kind,
+    /// Where in this file its distances stand.
+    key: &'static str,
+    definition: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ks_of_speed: Option<f64>,
+    /// Near enough is at most this.
+    bound: f64,
+    within_bound: bool,
+}
+
+impl Comparison {
+    fn new(kind: Kind, distances: &Distances) -> Self {
+        let (key, bound, definition) = match kind {
+            Kind::Free => (
+                "distances",
+                0.15,
+                "the scenario's own demand (inflow, density, speeds at both ends) and drivers; \
+                 nothing is taken from the recordings compared with",
+            ),
+            Kind::Bounded => (
+                "bounded",
+                0.15,
+                "the scenario's drivers between the start, arrivals, departures and the speed at \
+                 the end of each recording compared with",
+            ),
+            Kind::Replayed => ("distances", 0.10, "the trajectories of a recording (mode rep)"),
+        };
+        let ks_of_speed = distances.get("speed_m_s").map(|d| d.ks);
+        let within_bound = ks_of_speed.is_some_and(|ks| ks <= bound);
+        Self { kind, key, definition, ks_of_speed, bound, within_bound }
+    }
+
+    /// A line: what it is, the verdict, all distances.
+    fn line(&self, distances: Option<&Distances>) -> String {
+        let all: Vec<String> = distances
+            .into_iter()
+            .flatten()
+            .map(|(key, d)| format!("{key} {:.3} ({:.2})", d.ks, d.wasserstein))
+            .collect();
+        let name = match self.kind {
+            Kind::Free => "free",
+            Kind::Bounded => "bounded",
+            Kind::Replayed => "replayed",
+        };
+        let verdict = match self.ks_of_speed {
+            Some(ks) => format!(
+                "KS of speed {ks:.3}, {} {:.2}",
+                if self.within_bound { "within" } else { "not within" },
+                self.bound
+            ),
+            None => "no speeds to compare".to_owned(),
+        };
+        format!(
+            "\n{name} (`{}`: {}): {verdict}; KS (Wasserstein) to measured: {}",
+            self.key,
+            self.definition,
+            all.join(", ")
+        )
+    }
 }
 
 type Distances = BTreeMap<&'static str, Distance>;
@@ -147,11 +224,17 @@ impl Report {
                         .then(|| distances(s, &others)),
                 }
             });
-        let together = bounded.first().map(|first| {
+        let together: Option<Bounded> = bounded.first().map(|first| {
             let mut all = first.clone();
             bounded.iter().skip(1).for_each(|b| all.append(b));
             Bounded::new(&all, &measured.samples, &measured.kept_m_s.concat())
         });
+        let distances = there.then(|| distances(&driven.samples, &measured.samples));
+        let driven_kind = if driven.mode == Mode::Rep { Kind::Replayed } else { Kind::Free };
+        let comparisons = distances
+            .iter()
+            .map(|d| Comparison::new(driven_kind, d))
+            .chain(together.iter().map(|b| Comparison::new(Kind::Bounded, &b.distances)));
         Self {
             provenance: Provenance::of_seed(seed),
             scenario: scenario.name.clone(),
@@ -161,7 +244,8 @@ impl Report {
             calibrated_to: calibrated_to.iter().map(|p| p.display().to_string()).collect(),
             simulated: figures(&driven.samples, driven.lanes_m),
             measured: there.then(|| figures(&measured.samples, measured.lanes_m)),
-            distances: there.then(|| distances(&driven.samples, &measured.samples)),
+            comparisons: comparisons.collect(),
+            distances,
             bounded: together,
             recordings: recordings.collect(),
         }
@@ -184,19 +268,12 @@ impl Report {
             s.lane_changes_per_vehicle_1_km,
             s.min_gap_m,
         );
-        if let Some(distances) = &self.distances {
-            let all: Vec<String> = distances
-                .iter()
-                .map(|(key, d)| format!("{key} {:.3} ({:.2})", d.ks, d.wasserstein))
-                .collect();
-            text.push_str("; KS (Wasserstein) to measured: ");
-            text.push_str(&all.join(", "));
-        }
-        if let Some(bounded) = &self.bounded {
-            let all: Vec<String> =
-                bounded.distances.iter().map(|(key, d)| format!("{key} {:.3}", d.ks)).collect();
-            text.push_str("; KS with the measured start and arrivals: ");
-            text.push_str(&all.join(", "));
+        for comparison in &self.comparisons {
+            let distances = match comparison.kind {
+                Kind::Bounded => self.bounded.as_ref().map(|b| &b.distances),
+                Kind::Free | Kind::Replayed => self.distances.as_ref(),
+            };
+            text.push_str(&comparison.line(distances));
         }
         text
     }
