@@ -1,7 +1,7 @@
 //! Hides effects in generated drives and counts what the diagnosis makes of them:
-//! `campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,channel] [only=cause]
-//! [from=CASE] [to=CASE] [dump=DIR]`, KIND one of `clean`, `small`, `medium`, `large`, `pairs`,
-//! `outside`, `deleted`. One line per case (`.` exact, `+` first right, `-` nothing, `X` wrong),
+//! `campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,channel] [only=cause]
+//! [from=CASE] [to=CASE] [cases=N,N,...] [dump=DIR]`, KIND one of `clean`, `small`, `medium`,
+//! `large`, `pairs`, `outside`, `deleted`. One line per case (`.` exact, `+` first right, `-` nothing, `X` wrong),
 //! then the table.
 #![expect(
     clippy::disallowed_macros,
@@ -26,7 +26,7 @@ use support::outside::OUTSIDE;
 use support::random::{between, sign};
 use support::{Campaign, generate};
 
-const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [dump=DIR]";
+const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR]";
 
 #[derive(Default)]
 struct Table {
@@ -36,6 +36,7 @@ struct Table {
     any: usize,
     all: usize,
     silent: usize,
+    unseen: usize,
     wrong: usize,
     unknown: usize,
     signal: usize,
@@ -206,6 +207,7 @@ impl Table {
         let hit = visible.iter().filter(|id| named.contains(**id)).count();
         let unseen = visible.is_empty() && named.is_empty();
         let first = named.first().is_some_and(|n| truth.contains(n)) || unseen;
+        self.unseen += usize::from(unseen && !truth.is_empty());
         let all = hit == visible.len();
         let exact = all && named.len() == visible.len() && d.verdict != Verdict::Unknown;
         self.first += usize::from(first);
@@ -272,6 +274,7 @@ impl Table {
         println!("all named           {}", of(self.all));
         println!("at least one named  {}", of(self.any));
         println!("exact set           {}", of(self.exact));
+        println!("not observable      {}", of(self.unseen));
         println!("nothing to explain  {}", of(self.silent));
         println!(
             "unknown             {}, right signal first {}",
@@ -302,9 +305,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let number = |key: &str, default: usize| option(key).map_or(Ok(default), str::parse::<usize>);
     let mut campaign = Campaign::FULL;
     campaign.drives = number("drives=", campaign.drives)?;
+    let held = number("held=", 0)?;
     if let Some(s) = option("seconds=") {
         campaign.duration_s = s.parse()?;
     }
+    let listed = |case: usize| {
+        let case = case.to_string();
+        option("cases=").is_none_or(|list| list.split(',').any(|c| c == case))
+    };
     let (from, to) = (number("from=", 0)?, number("to=", usize::MAX)?);
     let plant = Plant::of_truck(&TruckParameters::load("reference")?)?;
     let usual = Campaign { drives: 8, ..campaign };
@@ -315,7 +323,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let case_seed = seed.wrapping_mul(1_000_003) + case as u64;
         let mut rng = ChaCha8Rng::seed_from_u64(case_seed ^ 0x5eed);
         let hidden = draw(kind, case, option("only="), &mut rng).ok_or(USAGE)?;
-        if case < from {
+        if case < from || !listed(case) {
             continue;
         }
         let mut set = generate(&hidden, &campaign, case_seed);
@@ -329,6 +337,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             dump(&set, Path::new(folder))?;
         }
         let mut options = Options::default();
+        let names = set.drives.iter().rev().take(held).map(|d| d.name.clone());
+        options.hold_out = names.collect();
         let deleted = kind == "deleted";
         if deleted {
             options.excluded = hidden

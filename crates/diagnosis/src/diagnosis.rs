@@ -11,7 +11,7 @@ use crate::report_models::Models;
 use crate::search::{Fit, MIN_EVIDENCE};
 use crate::sentence;
 use crate::sure::{Sure, judge};
-use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Plant};
+use crate::{Action, DiagnosisError, Drive, DriveSet, Executor, Finding, FindingKind, Plant};
 
 /// What the search concludes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -308,11 +308,14 @@ pub fn diagnose_with(
     let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);
     let fit = if faint { empty } else { fit };
     causes.retain(|_| !faint);
+    if sure == Sure::Not {
+        causes.iter_mut().for_each(|c| c.0.sentence.push_str(sentence::NOT_SURE));
+    }
     let verdict = if sure == Sure::Outside {
         Verdict::Unknown
     } else if fit.set.is_empty() {
         Verdict::NothingToExplain
-    } else if sure == Sure::Not || causes.first().is_some_and(|c| c.1) {
+    } else if sure == Sure::Not || causes.iter().any(|c| c.1) {
         Verdict::Ambiguous
     } else {
         Verdict::Explained
@@ -328,6 +331,16 @@ pub fn diagnose_with(
         .then(|| gain(plant, &problem.reference, held, &fit, executor))
         .transpose()?;
     let wrong = wrong(&problem, floor);
+    let mut findings = drives.findings.clone();
+    if drives.truck != plant.name {
+        findings.push(Finding {
+            drive: "all".to_owned(),
+            channel: None,
+            time_s: None,
+            kind: FindingKind::TruckName { index: drives.truck.clone() },
+            action: Action::Kept,
+        });
+    }
     let extended_truck = (!fit.set.is_empty()).then(|| format!("{}.extended.toml", plant.name));
     Ok(Diagnosis {
         schema: 1,
@@ -341,7 +354,7 @@ pub fn diagnose_with(
         gain,
         extended_truck,
         tolerances_from_baseline: baseline.is_some(),
-        findings: drives.findings.clone(),
+        findings,
         models,
     })
 }

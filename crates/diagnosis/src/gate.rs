@@ -13,6 +13,11 @@ const MIN_SIGMAS: f64 = 2.6;
 /// How many drives' worth the expectation counts that drives scatter as their information says.
 const DISPERSION_PRIOR: f64 = 4.0;
 
+/// Evidence, and part of a size's evidence, that sizes of the drives' own may add before the drives
+/// disagree.
+const OWN_SIZES: f64 = 6.0;
+const OWN_SIZES_PART: f64 = 0.15;
+
 /// Part of the smallest size worth a word below which a cause is dropped.
 const WORTH: f64 = 0.5;
 /// Part of the information about a cause in one drive above which no other drive can confirm it.
@@ -27,17 +32,10 @@ impl Problem<'_> {
     /// poorly, so it is drawn towards one by [`DISPERSION_PRIOR`] drives' worth, and the interval
     /// gets the t-factor of what is left.
     pub(crate) fn variances(&self, fit: &Fit) -> Vec<f64> {
-        let zero = &self.reference.theta;
-        let sigma = prior(&fit.free);
         let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
-        let pull = DVector::from_fn(k, |j, _| {
-            let p = fit.free[j] as usize;
-            (fit.theta[p] - zero[p]) / (sigma[j] * sigma[j] * drives)
-        });
         let (mut seen, mut expected) = (vec![0.0; k], vec![0.0; k]);
-        for (g, score) in fit.gram.per_drive.iter().zip(fit.gram.scores(&DVector::zeros(k))) {
+        for (g, score) in fit.gram.per_drive.iter().zip(self.pulls(fit)) {
             let a = g.view((1, 1), (k, k));
-            let score = score - &pull;
             let moved = &fit.covariance * score;
             let spread = &fit.covariance * a * &fit.covariance;
             for j in 0..k {
@@ -54,6 +52,36 @@ impl Problem<'_> {
                 fit.covariance[(j, j)] * dispersion.max(0.8) * t_factor * t_factor
             })
             .collect()
+    }
+
+    /// Gradient of every drive at the fit, less its part of the prior's.
+    fn pulls(&self, fit: &Fit) -> Vec<DVector<f64>> {
+        let zero = &self.reference.theta;
+        let sigma = prior(&fit.free);
+        let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
+        let pull = DVector::from_fn(k, |j, _| {
+            let p = fit.free[j] as usize;
+            (fit.theta[p] - zero[p]) / (sigma[j] * sigma[j] * drives)
+        });
+        let scores = fit.gram.scores(&DVector::zeros(k));
+        scores.into_iter().map(|score| score - &pull).collect()
+    }
+
+    /// The drives do not agree about a size: sizes of their own would add much to the evidence of a
+    /// common one (Cochran's Q; Biometrics 10, 1954). What stands in for another cause
+    /// fits drives of one load, speed or heading and not the others.
+    pub(crate) fn disagree(&self, fit: &Fit) -> bool {
+        let (pulls, sigma) = (self.pulls(fit), prior(&fit.free));
+        let freedom = pulls.len() as f64 - 1.0;
+        fit.free.iter().enumerate().any(|(j, p)| {
+            let x = fit.theta[*p as usize] - self.reference.theta[*p as usize];
+            let evidence = 0.5 * x * x / fit.covariance[(j, j)].max(f64::MIN_POSITIVE);
+            let drives = fit.gram.per_drive.iter().zip(&pulls);
+            let share = 1.0 / (sigma[j] * sigma[j] * pulls.len() as f64);
+            let q: f64 = drives.map(|(g, s)| s[j] * s[j] / (g[(j + 1, j + 1)] + share)).sum();
+            let size = fit.set.iter().any(|h| CATALOGUE[*h].sizes.contains(p));
+            size && 0.5 * (q - freedom) > OWN_SIZES.max(OWN_SIZES_PART * evidence)
+        })
     }
 
     /// Information about the first size of every hypothesis at the reference, best start.

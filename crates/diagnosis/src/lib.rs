@@ -4,6 +4,7 @@
 
 pub mod balance;
 pub mod carbon;
+mod catch_all;
 mod channel;
 pub mod clock;
 pub mod coast_down;

@@ -93,6 +93,10 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
     }
 }
 
+/// Said of causes that leave much.
+pub(crate) const NOT_SURE: &str = " Not sure: it leaves what another cause would explain, or the \
+    drives do not agree about its size.";
+
 /// Why two causes look alike, and what would tell them apart.
 pub(crate) fn confusion(a: &str, b: &str, lost_nats: f64) -> String {
     let has = |x: &[&str]| x.contains(&a) && x.contains(&b);

@@ -2,6 +2,7 @@
 //! may stand in for something else, or give way to a free function of a signal.
 
 use crate::Unknown;
+use crate::catch_all::Left;
 use crate::hypothesis::CATALOGUE;
 use crate::param::P;
 use crate::problem::Problem;
@@ -37,6 +38,11 @@ const MISFIT: f64 = 1.2;
 /// Part of the width between its bounds within which a figure counts as at one.
 const BOUND: f64 = 1e-3;
 
+/// Evidence, and part of the causes' evidence, that a force without a name may add before causes of
+/// the force balance are not sure.
+const CATCH_ALL: f64 = 4.0;
+const CATCH_ALL_PART: f64 = 0.05;
+
 /// Part of the excess of a module below which a function of a signal does not describe what is
 /// left: noise that comes and goes gives every signal something.
 const FOLLOWS: f64 = 0.05;
@@ -52,8 +58,26 @@ pub(crate) enum Sure {
     Outside,
 }
 
-/// Decides between named causes, a free function of a signal and a random disturbance.
+/// Decides between named causes, a free function of a signal and a random disturbance, and whether
+/// causes that stay may stand in for something else.
 pub(crate) fn judge(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, Sure) {
+    let (fit, unknown, sure) = against_functions(problem, empty, fit);
+    if sure != Sure::Yes || fit.set.is_empty() {
+        return (fit, unknown, sure);
+    }
+    let doubt = || -> Option<Left> {
+        let left = (sharing(&fit, Module::Force) > 0).then(|| problem.catch_all(&fit)).flatten()?;
+        (left.evidence > CATCH_ALL.max(CATCH_ALL_PART * fit.log_z)).then_some(left)
+    };
+    if let Some(left) = doubt() {
+        return (fit, unknown.or(Some(resembling(&left))), Sure::Not);
+    }
+    let sure =
+        if stands_in(problem, &fit) || problem.disagree(&fit) { Sure::Not } else { Sure::Yes };
+    (fit, unknown, sure)
+}
+
+fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, Sure) {
     let bare = beyond(problem, problem.shapes(&empty.theta));
     let best_bare = bare.first().map_or(0.0, |s| s.log_z);
     if let Some(random) = problem.restless(&empty.theta)
@@ -96,8 +120,7 @@ pub(crate) fn judge(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Optio
         let sure = if sharing(&fit, random.module) > 0 { Sure::Not } else { Sure::Yes };
         return (fit, Some(noise(&random)), sure);
     }
-    let sure = if stands_in(problem, &fit) { Sure::Not } else { Sure::Yes };
-    (fit, None, sure)
+    (fit, None, Sure::Yes)
 }
 
 /// Free functions beyond those that drives in order have too, best first.
@@ -155,6 +178,18 @@ fn describe(shapes: &[Shape]) -> Option<Unknown> {
         evidence: best.log_z,
         table: best.knots.clone(),
     })
+}
+
+/// A force that named causes leave.
+fn resembling(left: &Left) -> Unknown {
+    Unknown {
+        signals: vec![left.signal],
+        quantity: Module::Force.quantity(),
+        shape: format!("what is left resembles {}", left.words),
+        explained_frac: 0.0,
+        evidence: left.evidence,
+        table: Vec::new(),
+    }
 }
 
 /// A disturbance that follows no signal: the channel that shows it, and the other yaw rate with it.

@@ -5,7 +5,9 @@
 #[allow(dead_code, reason = "each user of the generator needs a part of it")]
 mod support;
 
-use diagnosis::{Channel as C, Drive, DriveSet, Options, Plant, Serial, Verdict, diagnose};
+use diagnosis::{
+    Channel as C, Drive, DriveSet, Finding, FindingKind, Options, Plant, Serial, Verdict, diagnose,
+};
 use dynamics::TruckParameters;
 use support::{Campaign, generate};
 
@@ -89,6 +91,18 @@ fn drives_of_a_truck_with_another_axle_are_refused() {
     let plant = Plant::of_truck(&other).unwrap();
     let options = Options::default();
     assert!(diagnose(&plant, &short(), None, &options, &Serial, &mut |_| {}).is_err());
+}
+
+#[test]
+fn an_index_that_names_another_truck_is_a_finding() {
+    let mut drives = short();
+    drives.truck = "another".into();
+    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
+    let options = Options::default();
+    let d = diagnose(&plant, &drives, None, &options, &Serial, &mut |_| {}).unwrap();
+    let named =
+        |f: &Finding| matches!(&f.kind, FindingKind::TruckName { index } if index == "another");
+    assert!(d.findings.iter().any(named), "{:?}", d.findings);
 }
 
 #[test]

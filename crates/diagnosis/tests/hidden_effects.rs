@@ -6,8 +6,8 @@
 mod support;
 
 use diagnosis::{
-    Baseline, Diagnosis, DiagnosisError, DriveSet, Options, Plant, Serial, Verdict, diagnose,
-    diagnose_with,
+    Baseline, Channel as C, Diagnosis, DiagnosisError, DriveSet, Options, Plant, Serial, Verdict,
+    diagnose, diagnose_with,
 };
 use dynamics::TruckParameters;
 use support::effects::{Effect, Shape};
@@ -62,6 +62,36 @@ fn a_dead_time_of_the_steering_has_the_size_of_a_lag() {
     let (lag, form) = (d.causes[0].parameters["lag_s"], d.causes[0].parameters["pure_delay_frac"]);
     assert!((lag.value - 0.12).abs() < 3.0 * lag.sigma, "{lag:?}");
     assert!(form.value > 0.5, "{form:?}");
+}
+
+/// What explains some of it must not be stated as sure: load without its cause looked like better
+/// driveline, cold tyres like more rolling resistance.
+#[test]
+fn a_substitute_for_a_cause_that_the_catalogue_lacks_is_not_stated_as_sure() {
+    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
+    let clean = Baseline::learn(&plant, &drives(&[], 900), &Serial).unwrap();
+    for (id, size) in [("mass", -0.1), ("tyre_warmup", 0.5)] {
+        let set = drives(&[cause(id, size)], 43);
+        let options = Options { excluded: vec![id.to_owned()], ..Options::default() };
+        let d = diagnose_with(&plant, &set, Some(&clean), &options, &Serial, &mut |_| {}).unwrap();
+        assert_ne!(d.verdict, Verdict::Explained, "{id}: {:?}", d.causes);
+    }
+}
+
+/// Brakes act in these drives whether or not a channel shows them: without the channels they were a
+/// force without a name.
+#[test]
+fn drives_in_order_leave_nothing_to_explain_although_the_brakes_are_not_logged() {
+    let mut set = drives(&[], 17);
+    for d in &mut set.drives {
+        for c in [C::BrakePressureKpa, C::XbrDecelMS2, C::EngineBrakeFrac] {
+            d.remove(c);
+        }
+    }
+    let d = judge(&set).unwrap();
+    assert_eq!(d.verdict, Verdict::NothingToExplain, "{:?} {:?}", d.causes, d.unknown);
+    let brakes = d.not_observable.iter().find(|n| n.id == "brake_gain").unwrap();
+    assert_eq!(brakes.missing_channels, ["brake_pressure_kpa"]);
 }
 
 /// Shifts are events, not samples; torque that fades is a factor, not an addition; a receiver that

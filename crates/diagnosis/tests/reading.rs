@@ -45,6 +45,22 @@ fn a_pedal_in_percent_is_converted_and_said_so() {
 }
 
 #[test]
+fn a_wheel_speed_in_km_h_and_a_torque_as_a_fraction_are_converted_and_said_so() {
+    let dir = folder(std::iter::empty());
+    let mut csv = "time_s,speed_m_s,engine_torque_percent\n".to_owned();
+    for t in (0..2400).map(|i| f64::from(i) * 0.05) {
+        csv += &format!("{t},{},{}\n", 3.6 * speed(t), 0.4 + 0.3 * (0.2 * t).sin());
+    }
+    write(dir.path(), "d.csv", &csv);
+    let set = read_drives(dir.path()).unwrap();
+    let drive = &set.drives[0];
+    assert!((drive.get(Channel::SpeedMS).unwrap()[100] - speed(5.0)).abs() < 1e-9);
+    assert!((drive.get(Channel::EngineTorquePercent).unwrap()[0] - 40.0).abs() < 1e-9);
+    let units = set.findings.iter().filter(|f| matches!(f.kind, FindingKind::WrongUnit { .. }));
+    assert!(units.clone().count() == 2 && units.clone().all(|f| f.action == Action::Corrected));
+}
+
+#[test]
 fn a_channel_that_is_mostly_missing_is_dropped_with_a_finding() {
     let set = drive(|i| if i % 3 == 0 { "0.4".to_owned() } else { String::new() }).unwrap();
     assert!(!set.drives[0].has(Channel::AcceleratorPedalFrac));
@@ -77,7 +93,7 @@ fn an_empty_table_and_a_missing_index_are_errors() {
 }
 
 #[test]
-fn a_receiver_whose_clock_is_late_is_reported_with_its_lag() {
+fn a_receiver_whose_clock_is_late_is_reported_with_its_lag_and_corrected() {
     let dir = tempfile::tempdir().unwrap();
     let v =
         |t: f64| 18.0 + 3.0 * (0.21 * t).sin() + 1.3 * (0.057 * t).cos() + 2.0 * (0.013 * t).sin();
@@ -91,7 +107,8 @@ fn a_receiver_whose_clock_is_late_is_reported_with_its_lag() {
         "drives.toml",
         "schema = 1\ntruck = \"reference\"\n[[drive]]\nname = \"d\"\nfile = \"d.csv\"\n",
     );
-    let found = read_drives(dir.path()).unwrap().findings;
+    let set = read_drives(dir.path()).unwrap();
+    let found = &set.findings;
     let lag = found.iter().find_map(|f| match &f.kind {
         FindingKind::ClockOffset { against, seconds, .. } if against == "speed_m_s" => {
             Some(*seconds)
@@ -99,6 +116,12 @@ fn a_receiver_whose_clock_is_late_is_reported_with_its_lag() {
         _ => None,
     });
     assert!((lag.unwrap() - 2.4).abs() < 0.05, "{found:?}");
+    assert!(found.iter().all(|f| f.action == Action::Corrected), "{found:?}");
+    let gps = set.drives[0].get(Channel::GpsSpeedMS).unwrap();
+    for i in (0..11_900).step_by(100) {
+        let t = i as f64 * 0.05;
+        assert!((gps[i] - v(t)).abs() < 0.03, "{t} s: {} m/s, {} m/s", gps[i], v(t));
+    }
 }
 
 /// An executor that does the last job first.

@@ -9,7 +9,7 @@
 use std::path::Path;
 
 use diagnosis::clock::{ClockTrack, Kind, Rates, Signal, track};
-use diagnosis::{Channel, Drive, Finding, read_drives};
+use diagnosis::{Channel, Drive, Finding, RawTable, read_drives, read_table};
 
 use crate::plot::{Panel, Series, write};
 use crate::table::{at, column, files, read, stem};
@@ -38,7 +38,9 @@ pub(crate) fn study(dir: &Path, out: Option<&Path>) -> crate::Outcome<(Vec<Findi
     }
     let mut tracks = Vec::new();
     for drive in &set.drives {
-        if let Some(found) = report(drive, out)? {
+        // the drive has been moved to one clock, its table has not
+        let table = read_table(&folder.join(format!("{}.csv", drive.name)))?;
+        if let Some(found) = report(&drive.name, &table, out)? {
             tracks.push((drive.name.clone(), found));
         }
     }
@@ -85,17 +87,17 @@ fn join(
     Ok(csv)
 }
 
-fn report(drive: &Drive, out: Option<&Path>) -> crate::Outcome<Option<ClockTrack>> {
-    let (Some(wheel), Some(gps)) = (drive.get(Channel::SpeedMS), drive.get(Channel::GpsSpeedMS))
-    else {
-        return Err(format!("{}: a speed is missing", drive.name).into());
+fn report(name: &str, table: &RawTable, out: Option<&Path>) -> crate::Outcome<Option<ClockTrack>> {
+    let speed = |c: Channel| table.column(c.name());
+    let (Some(wheel), Some(gps)) = (speed(Channel::SpeedMS), speed(Channel::GpsSpeedMS)) else {
+        return Err(format!("{name}: a speed is missing").into());
     };
     let signal = |samples| Signal { samples, kind: Kind::Value };
     let Some(found) = track(&Rates::new(signal(gps), signal(wheel), Drive::STEP_S)) else {
-        println!("{}: the two speeds do not move together anywhere", drive.name);
+        println!("{name}: the two speeds do not move together anywhere");
         return Ok(None);
     };
-    println!("{}: correlation as recorded {:.3}", drive.name, found.correlation_as_recorded);
+    println!("{name}: correlation as recorded {:.3}", found.correlation_as_recorded);
     for s in &found.stretches {
         println!(
             "  {:6.0} to {:6.0} s: GPS behind CAN by {:7.2} +- {:.2} s, drift {:6.2} +- {:.2} ms/s, correlation {:.3}",
@@ -128,12 +130,12 @@ fn report(drive: &Drive, out: Option<&Path>) -> crate::Outcome<Option<ClockTrack
                 .collect(),
             line: true,
         };
-        let lag = (0..drive.len).step_by(20).map(|i| i as f64 * Drive::STEP_S);
+        let lag = (0..gps.len()).step_by(20).map(|i| i as f64 * Drive::STEP_S);
         write(
-            &out.join(format!("clock-{}.svg", drive.name)),
+            &out.join(format!("clock-{name}.svg")),
             &[
                 Panel {
-                    title: &format!("{}: speed, as recorded", drive.name),
+                    title: &format!("{name}: speed, as recorded"),
                     x: "time, s",
                     y: "m/s",
                     series: vec![line("CAN", wheel), line("GPS", gps)],

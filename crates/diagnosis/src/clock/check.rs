@@ -23,8 +23,9 @@ const PAIRS: [Pair; 3] = [
     Pair { channel: C::HeadingRad, against: C::YawRateRadS, offset_s: 1.0, drift_s: 3.0 },
 ];
 
-/// Appends a finding for every clock that is apart from another, drifts or jumps.
-pub(crate) fn check(drive: &Drive, findings: &mut Vec<Finding>) {
+/// Appends a finding for every clock that is apart from another, drifts or jumps, and moves its
+/// channels to the other clock.
+pub(crate) fn check(drive: &mut Drive, findings: &mut Vec<Finding>) {
     for pair in &PAIRS {
         let Pair { channel, against, .. } = *pair;
         let (Some(x), Some(y)) = (drive.get(channel), drive.get(against)) else { continue };
@@ -46,7 +47,18 @@ pub(crate) fn check(drive: &Drive, findings: &mut Vec<Finding>) {
         for s in &mut track.stretches {
             s.lag_s -= held;
         }
+        let before = findings.len();
         report(drive, pair, &track, findings);
+        if findings.len() > before {
+            let moved = track.aligned(x, Drive::STEP_S);
+            // the receiver's other channel has its clock
+            let altitude = (channel == C::GpsSpeedMS)
+                .then(|| drive.get(C::GpsAltitudeM).map(|h| track.aligned(h, Drive::STEP_S)));
+            drive.set(channel, moved);
+            if let Some(altitude) = altitude.flatten() {
+                drive.set(C::GpsAltitudeM, altitude);
+            }
+        }
     }
 }
 
@@ -75,7 +87,7 @@ fn report(drive: &Drive, pair: &Pair, track: &ClockTrack, out: &mut Vec<Finding>
             channel: Some(pair.channel.name().to_owned()),
             time_s: time_s.map(|t| t + drive.start_s),
             kind,
-            action: Action::Kept,
+            action: Action::Corrected,
         });
     };
     let against = || pair.against.name().to_owned();

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector};
 use super::signals::Line;
 use super::{Direction, Problem, Rest, inner};
 use crate::param::Theta;
-use crate::replay::MODULES;
+use crate::replay::{MODULES, Module};
 use crate::unknown::KNOTS;
 
 /// Marginal Gram matrix per drive over `[r, columns]`.
@@ -91,6 +91,24 @@ impl Problem<'_> {
             }
         }
         (self.together(parts.into_iter().map(|p| (p.0, p.2))), chi)
+    }
+
+    /// Gram matrix of the residual at `theta`, the directions from there, and further columns of one
+    /// module, given per drive.
+    pub(crate) fn gram_beside(
+        &self,
+        theta: &Theta,
+        directions: &[Direction],
+        module: Module,
+        columns: &(dyn Fn(usize) -> Vec<Vec<f64>> + Sync),
+    ) -> Gram {
+        let parts = self.each(|i| {
+            let mut lines = vec![self.at(i, theta)];
+            lines.extend(directions.iter().map(|d| self.line(i, theta, d)));
+            lines.extend(columns(i).into_iter().map(|c| Self::column(module, c)));
+            self.marginal(i, &lines)
+        });
+        self.together(parts.into_iter())
     }
 
     /// Gram matrices of all drives and their products with the common effects.

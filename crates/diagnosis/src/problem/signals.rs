@@ -129,6 +129,19 @@ impl Problem<'_> {
         groups.iter().map(|g| self.sensitivity(i, *g, theta, direction)).collect()
     }
 
+    /// A sensitivity of one module alone, with these rows.
+    pub(super) fn column(module: Module, rows: Vec<f64>) -> Line {
+        let of = |group: &&Group| group.modules().contains(&module);
+        let line = GROUPS.iter().find(of).map(|group| {
+            let mut raw = vec![Vec::new(); group.modules().len()];
+            if let Some(at) = group.modules().iter().position(|m| *m == module) {
+                raw[at] = rows;
+            }
+            Arc::new(Signals::new(*group, false, Arc::new(raw)))
+        });
+        line.into_iter().collect()
+    }
+
     fn sensitivity(
         &self,
         i: usize,

@@ -176,7 +176,16 @@ fn unit_error(channel: Channel, v: &[f64], largest: f64) -> Option<(&'static str
     let mut sorted: Vec<f64> = v.iter().copied().filter(|x| x.is_finite()).collect();
     sorted.sort_by(f64::total_cmp);
     let median = sorted[sorted.len() / 2];
+    let beyond = |limit: f64| (sorted.len() - sorted.partition_point(|x| *x <= limit)) as f64;
     match channel {
+        // faster than any truck for longer than spikes last
+        Channel::SpeedMS | Channel::GpsSpeedMS
+            if largest <= 60.0 * 3.6 && beyond(60.0) > MAX_BAD_FRAC * sorted.len() as f64 =>
+        {
+            Some(("km/h", 1.0 / 3.6))
+        }
+        // a whole drive below 1.3 % of the reference torque
+        Channel::EngineTorquePercent if (0.2..=1.3).contains(&largest) => Some(("fraction", 100.0)),
         Channel::AcceleratorPedalFrac | Channel::EngineBrakeFrac
             if largest > 1.5 && largest <= 101.0 =>
         {

@@ -107,7 +107,7 @@ fn read_drive(
         drive.map = Some(road_map(&dir.join(map))?);
         grid::fill_from_map(&mut drive);
     }
-    crate::clock::check(&drive, &mut findings);
+    crate::clock::check(&mut drive, &mut findings);
     Ok((drive, findings))
 }
 

@@ -105,6 +105,10 @@ impl GradeBySection {
     }
 }
 
+/// Torque above which nobody brakes, percent, and samples until brakes that were on are off.
+const PULLS: f64 = 3.0;
+const RELEASE: i32 = 30;
+
 /// Samples kept away from a shift on either side.
 const SHIFT_MARGIN: usize = 12;
 
@@ -246,6 +250,22 @@ impl Prepared {
         GRAVITY_M_S2 * grade_frac / (1.0 + grade_frac * grade_frac).sqrt()
     }
 
+    /// Where brakes that no channel shows may act: with the demand if that is there, otherwise
+    /// wherever the engine does not pull.
+    fn may_be_held(&self) -> Vec<bool> {
+        let unseen = !self.has(&[C::BrakePressureKpa]);
+        let demanded = unseen && self.has(&[C::XbrDecelMS2]);
+        let coasting = unseen && !demanded || !self.has(&[C::EngineBrakeFrac]);
+        let mut left = 0;
+        (0..self.n)
+            .map(|i| {
+                let held = demanded && self.xbr[i] > 0.0 || coasting && self.torque[i] < PULLS;
+                left = if held { RELEASE } else { (left - 1).max(0) };
+                left > 0
+            })
+            .collect()
+    }
+
     fn mask(&mut self, plant: &Plant) {
         let n = self.n;
         let rows = |m: M, ok: &dyn Fn(usize, usize) -> bool| -> Vec<bool> {
@@ -258,8 +278,9 @@ impl Prepared {
         let longitudinal = self.has(&[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear])
             && self.has(&[C::GradeFrac]);
         if longitudinal {
+            let held = self.may_be_held();
             valid[M::Force as usize] =
-                seconds(M::Force, &|i| self.engaged[i] && self.speed[i] > 3.0);
+                seconds(M::Force, &|i| self.engaged[i] && self.speed[i] > 3.0 && !held[i]);
         }
         if self.has(&[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm]) {
             let idle = plant.truck.engine.idle_speed_rpm + 80.0;
