@@ -56,7 +56,7 @@ impl Fault {
     }
 
     /// A file that cannot be read: not there, or another reason.
-    fn file(path: &Path, text: String) -> Self {
+    pub(crate) fn file(path: &Path, text: String) -> Self {
         if path.exists() { Self::Io(text) } else { Self::NotFound(text) }
     }
 }

@@ -8,15 +8,28 @@
 //! Left out on purpose: everything that can be said in Python without loss.
 
 mod decision;
+mod diagnose;
 mod ego;
 mod fault;
 mod scenario;
 mod scene;
 mod world;
 
+/// What produced an output that this seed determines.
+const fn provenance(seed: u64) -> tractrix_core::Provenance {
+    tractrix_core::Provenance {
+        schema: 1,
+        version: env!("CARGO_PKG_VERSION"),
+        git_revision: env!("TRACTRIX_GIT_REVISION"),
+        seed,
+    }
+}
+
 /// What `tractrix` is made of; not to be imported by users.
 #[pyo3::pymodule]
 mod _native {
+    #[pymodule_export]
+    use crate::diagnose::diagnose_json;
     #[pymodule_export]
     use crate::scenario::{scenario_json, scenario_list};
     #[pymodule_export]

@@ -9,7 +9,7 @@ use planner::decider::{DeciderKind, LaneChoice};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use sim::{EndReason, Overrides, RunReport, Status, TickTimes, WallClock};
-use tractrix_core::{Neighbour, Plan, Provenance, Recorder, Tick, Time};
+use tractrix_core::{Neighbour, Plan, Recorder, Tick, Time};
 
 use crate::decision::{Decision, word};
 use crate::ego::Ego;
@@ -85,12 +85,6 @@ impl Drive {
     }
 
     fn summary(&self) -> Result<String, Fault> {
-        let provenance = Provenance {
-            schema: 1,
-            version: env!("CARGO_PKG_VERSION"),
-            git_revision: env!("TRACTRIX_GIT_REVISION"),
-            seed: self.seed,
-        };
         let end = match self.failure {
             Some(_) => Some(EndReason::Failed),
             None => self.world.status().end(),
@@ -101,7 +95,7 @@ impl Drive {
             pace: "max".to_owned(),
             wall_time_s: self.wall.as_secs_f64(),
         };
-        let report = RunReport::new(provenance, &self.world, end, wall);
+        let report = RunReport::new(crate::provenance(self.seed), &self.world, end, wall);
         serde_json::to_string(&report).map_err(|e| Fault::Work(e.to_string()))
     }
 }

@@ -1,4 +1,4 @@
-"""Heavy highway trucks in closed loop: every traffic mode and engine of Tractrix from Python.
+"""Heavy highway trucks in closed loop, in every traffic mode and engine of Tractrix.
 
     with tractrix.World("dense-15", seed=3) as world:
         world.step(1000)
@@ -9,9 +9,11 @@ Road frame: s along the route, d to the left of its reference line. The ego's re
 centre of the tractor's drive-axle group, on the ground.
 """
 
+from tractrix._diagnosis import diagnose
 from tractrix._native import GIT_REVISION as __git_revision__
 from tractrix._native import VERSION as __version__
 from tractrix._native import Snapshot
+from tractrix._recording import read_run
 from tractrix._scenario import scenario, scenarios
 from tractrix._state import SCENE_DTYPE, Decision, Ego
 from tractrix._world import World
@@ -24,6 +26,8 @@ __all__ = [
     "World",
     "__git_revision__",
     "__version__",
+    "diagnose",
+    "read_run",
     "scenario",
     "scenarios",
 ]

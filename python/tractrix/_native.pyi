@@ -7,6 +7,16 @@ GIT_REVISION: str
 
 def scenario_list() -> list[tuple[str, str]]: ...
 def scenario_json(name: str) -> str: ...
+def diagnose_json(
+    truck: str,
+    drives: str,
+    *,
+    baseline: str | None,
+    hold_out: list[str],
+    table_effect: bool,
+    seed: int,
+    out: str | None,
+) -> str: ...
 
 class Snapshot: ...
 

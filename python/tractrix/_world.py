@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import operator
 import os
 from collections.abc import Mapping
 from types import TracebackType
@@ -13,9 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tractrix import _native
+from tractrix._arguments import MAX_U64, path, whole
 from tractrix._state import SCENE_DTYPE, Decision, Ego
-
-_MAX_U64 = 2**64 - 1
 
 
 class World:
@@ -73,13 +71,13 @@ class World:
         self._native = _native.World(
             name,
             keys,
-            seed=None if seed is None else _whole("seed", seed),
-            road=_path(road),
-            truck=_path(truck),
+            seed=None if seed is None else whole("seed", seed),
+            road=path(road),
+            truck=path(truck),
             payload_kg=payload_kg,
             traffic=traffic,
             mode=mode,
-            manifest=_path(manifest),
+            manifest=path(manifest),
             on_traffic_failure=on_traffic_failure,
             decider=decider,
             speed_planner=speed_planner,
@@ -95,11 +93,11 @@ class World:
         Raises `RuntimeError` when the run cannot go on: SUMO fails, a repeated run differs from its
         manifest, the truck's state is not finite; `status` is `failed` from then on.
         """
-        return self._native.step(_whole("ticks", ticks))
+        return self._native.step(whole("ticks", ticks))
 
     def run(self) -> dict[str, Any]:
         """Drives to the end; returns `summary()`. Raises as `step`."""
-        self._native.step(_MAX_U64)
+        self._native.step(MAX_U64)
         return self.summary()
 
     @property
@@ -203,15 +201,3 @@ class World:
             return "<tractrix.World closed>"
         name = self.scenario()["name"]
         return f"<tractrix.World {name}, seed {self.seed}, {self.time_s:.2f} s, {self.status}>"
-
-
-def _path(path: str | os.PathLike[str] | None) -> str | None:
-    return None if path is None else os.fspath(path)
-
-
-def _whole(name: str, value: int) -> int:
-    """A whole number that fits 64 bits; `TypeError` for what is no whole number."""
-    number = operator.index(value)
-    if not 0 <= number <= _MAX_U64:
-        raise ValueError(f"{name} = {number} is outside 0 to 2**64 - 1")
-    return number

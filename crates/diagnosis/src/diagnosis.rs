@@ -204,6 +204,8 @@ pub enum Progress {
     Unknown,
     /// Rollouts on held-out drives.
     Gain,
+    /// Figures of the report.
+    Report,
 }
 
 /// Part of the evidence of a named cause within which another counts as equally good, nats.

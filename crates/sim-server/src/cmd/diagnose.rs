@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use diagnosis::{DriveSet, Options, Plant};
+use diagnosis::{DriveSet, Options, Request, Threads};
 use dynamics::TruckParameters;
 
 use crate::failure::Failure;
@@ -16,10 +16,8 @@ mod logger;
 mod recorded;
 mod report;
 mod results;
-mod threads;
 
 use results::Results;
-pub(crate) use threads::Threads;
 
 /// Finds what the simulation gets wrong on measured drives and names the cause. Writes
 /// diagnosis.json, report.html and the extended truck file.
@@ -78,31 +76,27 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let baseline_at = folder(&args.baseline, "baseline");
 
     let truck = TruckParameters::load(truck_name).map_err(Failure::input)?;
-    let plant = Plant::of_truck(&truck).map_err(Failure::input)?;
     let drives = read(&drives_at, &truck, &args.out.join("drives"), args.seed)?;
     let made = args.out.join("baseline");
     let baseline = baseline_at.as_deref().map(|b| read(b, &truck, &made, args.seed)).transpose()?;
     let options = Options { hold_out: args.hold_out.clone(), ..Options::default() };
-    let progress = &mut |p| stages.show(&stage(p));
-    let found =
-        diagnosis::diagnose(&plant, &drives, baseline.as_ref(), &options, &threads, progress)
-            .map_err(Failure::input)?;
-    stages.show("drawing the report");
-    let figures =
-        diagnosis::report::report(&plant, &drives, baseline.as_ref(), &options, &found, args.seed)
-            .map_err(Failure::work)?;
+    let request = Request {
+        truck: &truck,
+        truck_name,
+        drives: &drives,
+        drives_at: &drives_at,
+        baseline: baseline.as_ref(),
+        options: &options,
+        table_effect: args.table_effect,
+        seed: args.seed,
+    };
+    let outcome = request.run(&threads, &mut |p| stages.show(&stage(p))).map_err(Failure::input)?;
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
-    let table = args.table_effect.then(|| {
-        let origin = format!("diagnosis of {} on {}", found.truck, named(&drives_at));
-        diagnosis::try_table(&truck, &drives, &options, &found, &origin, &threads)
-    });
-    let table = table.transpose().map_err(Failure::input)?;
-    let mut results = Results::new(found, figures, named(&drives_at), args.seed);
-    results.table = table;
-    results.extend(&truck, truck_name, &args.out)?;
+    outcome.write_truck(&args.out).map_err(Failure::input)?;
+    let mut results = Results { outcome, example: None, seed: args.seed };
     if let Some(hidden) = hidden {
         stages.show("running the simulator with the extended truck");
-        let overlay = results.extension.overlay.as_ref();
+        let overlay = results.outcome.extension.overlay.as_ref();
         let closed_loop = example::close_the_loop(&hidden, overlay)?;
         results.example = Some((hidden, closed_loop));
     }
@@ -110,11 +104,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let text = results.write(&args.out)?;
     output::result(&if args.json { text } else { results.sentences(&args.out) });
     Ok(())
-}
-
-/// The last part of a path, for people.
-fn named(path: &Path) -> String {
-    path.file_name().map_or_else(|| "drives".to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
 /// Measured drives: a folder as the contract has it, or recordings of this program, from which
@@ -155,6 +144,7 @@ fn stage(p: diagnosis::Progress) -> String {
         P::Search { found: 0 } => "searching for a cause".to_owned(),
         P::Search { found } => format!("searching for a further cause, {found} so far"),
         P::Unknown => "looking outside the catalogue".to_owned(),
+        P::Report => "drawing the report".to_owned(),
         P::Gain => "replaying the drives that were held out".to_owned(),
         _ => "working".to_owned(),
     }

@@ -4,12 +4,12 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
-use diagnosis::DriveSet;
 use diagnosis::experiment::{Experiment, Known, NOTHING, Pair, Suggestion, suggest};
+use diagnosis::{DriveSet, Threads};
 use dynamics::TruckParameters;
 use serde::{Deserialize, Serialize};
 
-use super::diagnose::{Threads, read, write};
+use super::diagnose::{read, write};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Stages;

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use diagnosis::collect;
 use diagnosis::fidelity::{DriveFidelity, Replayed, SignalFidelity, fidelity};
+use diagnosis::{Threads, collect};
 use dynamics::TruckParameters;
 use serde::Serialize;
 
-use super::diagnose::{Threads, read, write};
+use super::diagnose::{read, write};
 use crate::failure::Failure;
 use crate::output;
 use crate::picture::{Line, Strip, Style, page};

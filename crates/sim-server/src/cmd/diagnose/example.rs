@@ -8,8 +8,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use diagnosis::collect;
 use diagnosis::logger::Draw;
+use diagnosis::{Threads, collect};
 use dynamics::catalogue::{Cause, Estimate, cause};
 use dynamics::{Overlay, TruckModel, TruckParameters};
 use road::Road;
@@ -18,7 +18,6 @@ use sim::{Scenario, Status, TrafficKind, World};
 
 use super::folder;
 use super::logger::drive;
-use super::threads::Threads;
 use crate::failure::Failure;
 use crate::provenance::Provenance;
 

@@ -1,12 +1,8 @@
-//! What a diagnosis writes and says: `diagnosis.json`, `report.html`, the extended truck file, and
-//! sentences for a terminal.
+//! What a diagnosis writes and says: `diagnosis.json`, `report.html`, and sentences for a terminal.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
-use diagnosis::report::Report;
-use diagnosis::{Diagnosis, Extension, TableTrial, Verdict};
-use dynamics::{Overlay, TruckParameters};
+use diagnosis::{Diagnosis, Outcome, TableTrial, Verdict};
 use serde_json::{Value, json};
 
 use super::example::{ClosedLoop, Hidden};
@@ -16,108 +12,43 @@ use crate::provenance::Provenance;
 
 /// A diagnosis with everything that goes into its files.
 pub(super) struct Results {
-    found: Diagnosis,
-    figures: Report,
-    pub(super) extension: Extension,
-    /// What is left without a name, tried as a table.
-    pub(super) table: Option<TableTrial>,
+    pub(super) outcome: Outcome,
     /// What was hidden, and the trip that closes the loop.
     pub(super) example: Option<(Hidden, ClosedLoop)>,
-    drives: String,
-    seed: u64,
+    pub(super) seed: u64,
 }
 
 impl Results {
-    /// Of drives with this name.
-    pub(super) fn new(found: Diagnosis, figures: Report, drives: String, seed: u64) -> Self {
-        let extension = Extension { overlay: None, not_carried: Vec::new() };
-        Self { found, figures, extension, table: None, example: None, drives, seed }
-    }
-
-    /// Writes the extended truck (and the truck file that it builds on, if it is not built in),
-    /// and loads it again.
-    pub(super) fn extend(
-        &mut self,
-        truck: &TruckParameters,
-        given: &str,
-        out: &Path,
-    ) -> Result<(), Failure> {
-        let name = file_name(&truck.name);
-        let built_in = TruckParameters::names().any(|n| n == given);
-        let base = if built_in { given.to_owned() } else { format!("{name}.base.toml") };
-        let origin = format!("diagnosis of {} on {}", self.found.truck, self.drives);
-        let extended = format!("{name}.extended");
-        self.extension = diagnosis::extend(truck, &base, &extended, &self.found.causes, &origin);
-        if let Some(effect) = self.table.as_ref().and_then(|t| t.effect.clone()) {
-            let overlay = self.extension.overlay.get_or_insert_with(|| Overlay {
-                schema: 1,
-                base: base.clone(),
-                name: extended.clone(),
-                set: BTreeMap::new(),
-                table_effects: Vec::new(),
-            });
-            overlay.table_effects.push(effect);
-        }
-        self.found.extended_truck = None;
-        if let Some(overlay) = &self.extension.overlay {
-            if !built_in {
-                let text = toml::to_string(truck).map_err(Failure::work)?;
-                write(&out.join(&base), &text)?;
-            }
-            let file = format!("{extended}.toml");
-            let path = out.join(&file);
-            write(&path, &toml::to_string(overlay).map_err(Failure::work)?)?;
-            TruckParameters::load(&path.display().to_string()).map_err(Failure::work)?;
-            self.found.extended_truck = Some(file);
-        }
-        Ok(())
-    }
-
     /// Writes `diagnosis.json` and `report.html`; the text of the former.
     pub(super) fn write(&self, out: &Path) -> Result<String, Failure> {
         let json = self.json()?;
         let text = serde_json::to_string_pretty(&json).map_err(Failure::work)?;
         write(&out.join("diagnosis.json"), &text)?;
-        let overlay = self.extension.overlay.as_ref().map(toml::to_string).transpose();
+        let Outcome { drives_name, found, figures, extension, .. } = &self.outcome;
+        let overlay = extension.overlay.as_ref().map(toml::to_string).transpose();
         let overlay = overlay.map_err(Failure::work)?;
         let example = self.example.as_ref().map(|(hidden, closed_loop)| {
             json!({ "hidden": hidden, "loop": closed_loop, "sentence": closed_loop.sentence() })
         });
-        let (drives, overlay) = (self.drives.as_str(), overlay.as_deref());
-        let page = report::page(&self.found, &json, &self.figures, drives, overlay, example);
+        let (drives, overlay) = (drives_name.as_str(), overlay.as_deref());
+        let page = report::page(found, &json, figures, drives, overlay, example);
         write(&out.join("report.html"), &page)?;
         Ok(text)
     }
 
     /// `diagnosis.json`: the diagnosis with its provenance.
     fn json(&self) -> Result<Value, Failure> {
-        let mut json =
-            serde_json::to_value(Provenance::of_seed(self.seed)).map_err(Failure::work)?;
-        let rest = serde_json::to_value(&self.found).map_err(Failure::work)?;
-        if let (Some(all), Value::Object(rest)) = (json.as_object_mut(), rest) {
-            all.extend(rest);
-            let lost = self.extension.not_carried.iter();
-            let lost: Vec<Value> = lost.map(|n| json!({ "id": n.id, "why": n.why })).collect();
-            all.insert("not_carried".to_owned(), lost.into());
-            if let Some(Value::Object(gain)) = all.get_mut("gain") {
-                let errors = serde_json::to_value(&self.figures.gains).map_err(Failure::work)?;
-                gain.insert("errors".to_owned(), errors);
-            }
-            if let Some(table) = &self.table {
-                let table = serde_json::to_value(table).map_err(Failure::work)?;
-                all.insert("table_effect".to_owned(), table);
-            }
-            if let Some((hidden, _)) = &self.example {
-                let hidden = serde_json::to_value(hidden).map_err(Failure::work)?;
-                all.insert("hidden".to_owned(), hidden);
-            }
+        let mut json = self.outcome.json(&Provenance::of_seed(self.seed)).map_err(Failure::work)?;
+        if let (Some(all), Some((hidden, _))) = (json.as_object_mut(), &self.example) {
+            let hidden = serde_json::to_value(hidden).map_err(Failure::work)?;
+            all.insert("hidden".to_owned(), hidden);
         }
         Ok(json)
     }
 
     /// The diagnosis for a terminal.
     pub(super) fn sentences(&self, out: &Path) -> String {
-        let Self { found, figures, extension, .. } = self;
+        let Outcome { found, figures, extension, table, .. } = &self.outcome;
         let mut lines = vec![verdict(found)];
         for cause in &found.causes {
             lines.push(format!("  {} (evidence {:.0} nats)", cause.sentence, cause.evidence));
@@ -130,7 +61,7 @@ impl Results {
             let signals = u.signals.join(", ");
             lines.push(format!("  outside the catalogue: {}; it follows {signals}", u.shape));
         }
-        lines.extend(self.table.as_ref().map(tried));
+        lines.extend(table.as_ref().map(tried));
         if let Some(g) = &found.gain {
             let held_out = g.held_out.join(", ");
             let mut claimed = figures.gains.iter().filter(|g| g.claimed).peekable();
@@ -179,11 +110,6 @@ impl Results {
         lines.push(format!("Report: {}", out.join("report.html").display()));
         lines.join("\n")
     }
-}
-
-/// A truck's name as a file name.
-fn file_name(name: &str) -> String {
-    name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
 /// What came of the table as a sentence.

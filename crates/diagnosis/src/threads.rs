@@ -1,16 +1,18 @@
-//! The diagnosis' jobs on the machine's cores.
+//! The jobs on the machine's cores: an executor that shells share. The diagnosis itself never uses it.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use diagnosis::Executor;
+use crate::Executor;
 
 /// As many threads as there are cores.
-pub(crate) struct Threads(usize);
+#[derive(Debug, Clone, Copy)]
+pub struct Threads(usize);
 
 impl Threads {
     /// For this machine.
-    pub(crate) fn available() -> Self {
+    #[must_use]
+    pub fn available() -> Self {
         Self(std::thread::available_parallelism().map_or(1, NonZeroUsize::get))
     }
 }

@@ -1,0 +1,23 @@
+"""The program `sim-server`, whose results the package's are compared with."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+WORKSPACE = Path(__file__).resolve().parents[2]
+
+
+def sim_server(*arguments: str | Path) -> str:
+    """Its output; tests are skipped where it has not been built."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", WORKSPACE / "target"))
+    program = target / "release" / "sim-server"
+    if not program.exists():
+        pytest.skip(f"{program} does not exist: cargo build --release -p sim-server")
+    run = subprocess.run(
+        [program, *arguments], check=True, capture_output=True, text=True, timeout=300
+    )
+    return run.stdout
