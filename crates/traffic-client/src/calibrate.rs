@@ -1,26 +1,39 @@
 //! Drivers from recordings: parameters of the native engine, so that its traffic has the measured
 //! distributions of speed, gap, headway and acceleration, and the measured rate of lane changes.
 //!
-//! First the drivers (desired speed, headway, standstill gap, acceleration, braking, MOBIL's
-//! politeness, threshold and bias) are searched in *bounded* traffic, which begins with the vehicles
-//! of a recording and gets its arrivals from it ([`Boundary`]). Then, with these drivers, the speed
-//! beyond the end of the stretch in *free* traffic, which has the measured flow and density only: it
-//! is where its congestion comes from, and what a scenario gets. Both searches are differential
-//! evolution; the measure is a weighted sum of Kolmogorov-Smirnov distances and, for the drivers,
-//! the rate of lane changes. Same recordings, same seed, same result.
+//! Two kinds of traffic are driven. *Bounded* traffic begins with the vehicles of a recording and
+//! gets its arrivals and the speed at its end from it ([`Boundary`]). *Free* traffic has the measured
+//! flow, density and classes only, and speeds of the traffic before and beyond the stretch (the
+//! *rim*: where its congestion comes from); it is what a scenario gets. In both, a weighted sum of
+//! Kolmogorov-Smirnov distances is small where traffic looks like the recordings; what counts is the
+//! mean of the distances to each of them, which is how far a further one will be. Differential
+//! evolution searches three times:
+//! 1. the drivers (desired speed, headway, standstill gap, acceleration, braking, MOBIL's
+//!    politeness, threshold and bias), in bounded traffic;
+//! 2. how they follow again (desired speed, headway, gap, acceleration), from there, in free traffic
+//!    with the rim at its measured speeds, as long as the bounded traffic is hardly worse for it:
+//!    what drivers wish for in traffic in which few are hindered shows in free traffic only;
+//! 3. the rim, in free traffic.
 //!
-//! Left out: differences between classes beyond their share and length, wishes that change in time.
+//! Same recordings, same seed, same result. Left out: differences between classes beyond their share
+//! and length, wishes that change in time.
 
 use std::sync::Arc;
 
 use road::Road;
-use tractrix_core::{EgoState, Geometry, Time, TrafficSource, VehicleClass};
 
 use crate::TrafficError;
-use crate::native::{Boundary, ClassConfig, NativeTraffic, TrafficConfig};
+use crate::native::{Boundary, TrafficConfig};
 use crate::replay::Recording;
 use crate::search;
-use crate::stats::{Observer, Quantity, Samples, kolmogorov_smirnov};
+use crate::stats::{Quantity, Samples, kolmogorov_smirnov};
+
+mod drives;
+mod knobs;
+
+pub use drives::{drive, drive_bounded, lanes_m};
+
+use knobs::{BOUNDS, DRIVERS, FOLLOWING, Knobs, RIM, guess, turned, with_measured_demand};
 
 /// Weights of the distances.
 const WEIGHTS: [(Quantity, f64); 4] = [
@@ -31,38 +44,22 @@ const WEIGHTS: [(Quantity, f64); 4] = [
 ];
 /// Weight of the rate of lane changes: its difference over its sum, 0 to 1.
 const LANE_CHANGE_WEIGHT: f64 = 0.2;
-/// Searched quantities with their bounds, in the order of [`Knobs`].
-const BOUNDS: [(&str, f64, f64); 12] = [
-    ("max_speed_m_s", 5.0, 40.0),
-    ("speed_factor_sigma_frac", 0.01, 0.24),
-    ("headway_s", 0.5, 3.0),
-    ("min_gap_m", 1.0, 6.0),
-    ("accel_m_s2", 0.4, 3.0),
-    ("decel_m_s2", 0.8, 4.0),
-    ("politeness_frac", 0.0, 1.0),
-    ("threshold_m_s2", 0.02, 1.5),
-    ("right_bias_m_s2", -0.3, 0.5),
-    ("outflow_speed_m_s", 0.5, 35.0),
-    ("outflow_sigma_m_s", 0.0, 8.0),
-    ("outflow_period_s", 3.0, 25.0),
-];
-type Knobs = [f64; BOUNDS.len()];
-/// The last of them say how fast the traffic beyond the end is, the others are the drivers'.
-const BEYOND: usize = 3;
-const DRIVERS: usize = BOUNDS.len() - BEYOND;
 /// Drives of the free traffic per trial, each with a seed of its own.
-const DRIVES: u64 = 2;
+const DRIVES: u64 = 6;
 /// Drives of each recording's bounded traffic per trial.
 const BOUNDED_DRIVES: u64 = 2;
-/// Between two looks of the observer, ticks.
-const LOOK_TICKS: u64 = 5;
+
+/// What the bounded traffic may get worse by while the free traffic gets better; more than this is
+/// paid for with this weight.
+const HARDLY_WORSE: f64 = 0.01;
+const WORSE_WEIGHT: f64 = 5.0;
 
 /// How thoroughly is searched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
     /// Generations of the search.
     pub generations: usize,
-    /// Simulated time per drive of the free traffic after its warm-up, s; a trial has two.
+    /// Simulated time per drive of the free traffic after its warm-up, s; a trial has six.
     pub trial_s: f64,
     /// Seed of the search and of its traffic.
     pub seed: u64,
@@ -70,7 +67,7 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { generations: 25, trial_s: 400.0, seed: 1 }
+        Self { generations: 25, trial_s: 120.0, seed: 1 }
     }
 }
 
@@ -79,8 +76,10 @@ impl Default for Effort {
 pub struct Calibration {
     /// Traffic with the parameters found.
     pub config: TrafficConfig,
-    /// Weighted distance of the bounded traffic to the recordings.
+    /// Weighted distance of the bounded traffic to the recordings, lane changes included.
     pub distance: f64,
+    /// Weighted distance of the free traffic to a recording, mean of them.
+    pub free_distance: f64,
     /// Trials driven.
     pub trials: usize,
 }
@@ -106,78 +105,140 @@ pub fn calibrate(
     base: &TrafficConfig,
     effort: Effort,
 ) -> Result<Calibration, TrafficError> {
-    let mut measured = lessons.first().map(|lesson| lesson.samples.clone()).unwrap_or_default();
-    lessons.iter().skip(1).for_each(|lesson| measured.append(lesson.samples));
-    let Some(first) = lessons
-        .first()
-        .filter(|_| !measured.of(Quantity::Gap).is_empty() && measured.duration_s >= 1.0)
-    else {
-        let why = "the recordings hold no vehicle behind another one".to_owned();
-        return Err(TrafficError::Config { why });
-    };
-    measured.sort();
-    let start = with_measured_demand(base, lessons, &measured);
-    let bounded = lessons
-        .iter()
-        .map(|lesson| {
+    let judge = Judge::of(lessons, base, effort.trial_s)?;
+    let Effort { generations, seed, .. } = effort;
+    let knobs = guess(&judge.start, &judge.together, judge.rims());
+    let alone = search::minimum(
+        &range_of::<DRIVERS>(0),
+        &part_of(&knobs, 0),
+        generations,
+        seed,
+        |drivers: &[f64; DRIVERS]| judge.bounded(&turned(&judge.start, &with(&knobs, 0, drivers))),
+    )?;
+    let knobs = with(&knobs, 0, &alone.best);
+    let reached = judge.bounded(&turned(&judge.start, &knobs))?;
+    let both = search::minimum(
+        &range_of::<FOLLOWING>(0),
+        &part_of(&knobs, 0),
+        generations / 2,
+        seed.wrapping_add(1),
+        |following: &[f64; FOLLOWING]| {
+            let config = turned(&judge.start, &with(&knobs, 0, following));
+            let worse = (judge.bounded(&config)? - reached - HARDLY_WORSE).max(0.0);
+            Ok::<f64, TrafficError>(judge.free(&config)? + WORSE_WEIGHT * worse)
+        },
+    )?;
+    let knobs = with(&knobs, 0, &both.best);
+    let rim = search::minimum(
+        &range_of::<RIM>(DRIVERS),
+        &part_of(&knobs, DRIVERS),
+        generations / 2,
+        seed.wrapping_add(2),
+        |rim: &[f64; RIM]| judge.free(&turned(&judge.start, &with(&knobs, DRIVERS, rim))),
+    )?;
+    let config = turned(&judge.start, &with(&knobs, DRIVERS, &rim.best));
+    let (distance, free_distance) = (judge.bounded(&config)?, judge.free(&config)?);
+    let trials = alone.trials + both.trials + rim.trials;
+    Ok(Calibration { config, distance, free_distance, trials })
+}
+
+/// Bounds of the knobs from this one on.
+fn range_of<const N: usize>(first: usize) -> [(f64, f64); N] {
+    std::array::from_fn(|k| {
+        let (_, low, high) = BOUNDS[first + k];
+        (low, high)
+    })
+}
+
+fn part_of<const N: usize>(knobs: &Knobs, first: usize) -> [f64; N] {
+    std::array::from_fn(|k| knobs[first + k])
+}
+
+/// The knobs with others from this one on.
+fn with<const N: usize>(knobs: &Knobs, first: usize, part: &[f64; N]) -> Knobs {
+    let mut all = *knobs;
+    all[first..first + N].copy_from_slice(part);
+    all
+}
+
+/// A recording as the bounded traffic needs it, and its sorted samples.
+struct Measured<'a> {
+    boundary: Arc<Boundary>,
+    road: &'a Arc<Road>,
+    samples: Samples,
+}
+
+/// All recordings, and how far traffic is from them.
+struct Judge<'a> {
+    each: Vec<Measured<'a>>,
+    /// Samples of all recordings, sorted.
+    together: Samples,
+    /// Road of the free traffic.
+    road: &'a Arc<Road>,
+    /// The measured demand.
+    start: TrafficConfig,
+    trial_s: f64,
+}
+
+impl<'a> Judge<'a> {
+    fn of(
+        lessons: &[Lesson<'a>],
+        base: &TrafficConfig,
+        trial_s: f64,
+    ) -> Result<Self, TrafficError> {
+        let mut together = lessons.first().map(|l| l.samples.clone()).unwrap_or_default();
+        lessons.iter().skip(1).for_each(|lesson| together.append(lesson.samples));
+        let Some(first) = lessons
+            .first()
+            .filter(|_| !together.of(Quantity::Gap).is_empty() && together.duration_s >= 1.0)
+        else {
+            let why = "the recordings hold no vehicle behind another one".to_owned();
+            return Err(TrafficError::Config { why });
+        };
+        together.sort();
+        let measured = |lesson: &Lesson<'a>| {
             let mut samples = lesson.samples.clone();
             samples.sort();
-            Ok((Arc::new(Boundary::of(lesson.road, lesson.recording)?), lesson.road, samples))
-        })
-        .collect::<Result<Vec<_>, TrafficError>>()?;
-    // All free drives together must look like the recordings, and each of them nearly so: otherwise
-    // the search would find what one seed happens to do.
-    let of_free = |config: &TrafficConfig| -> Result<f64, TrafficError> {
-        let (mut all, mut single) = (Samples::default(), 0.0);
+            let boundary = Arc::new(Boundary::of(lesson.road, lesson.recording)?);
+            Ok(Measured { boundary, road: lesson.road, samples })
+        };
+        let start = with_measured_demand(base, lessons, &together);
+        let each = lessons.iter().map(measured).collect::<Result<Vec<_>, TrafficError>>()?;
+        Ok(Self { each, together, road: first.road, start, trial_s })
+    }
+
+    fn rims(&self) -> impl Iterator<Item = &Boundary> + Clone {
+        self.each.iter().map(|measured| &*measured.boundary)
+    }
+
+    /// How far free traffic is from a recording: mean of all pairs of a drive and a recording, so
+    /// that a recording that is unlike all others weighs no more than they do, and what one seed
+    /// happens to do does not count as found.
+    fn free(&self, config: &TrafficConfig) -> Result<f64, TrafficError> {
+        let mut sum = 0.0;
         for k in 0..DRIVES {
-            let config = TrafficConfig { seed: start.seed.wrapping_add(k), ..config.clone() };
-            let samples = drive(first.road, config, effort.trial_s)?;
-            single += distance(&samples, &measured) / DRIVES as f64;
-            all.append(&samples);
+            let seed = self.start.seed.wrapping_add(k);
+            let config = TrafficConfig { seed, ..config.clone() };
+            let mut samples = drive(self.road, config, self.trial_s)?;
+            samples.sort();
+            sum += self.each.iter().map(|p| distance(&samples, &p.samples)).sum::<f64>();
         }
-        Ok(0.5 * (distance(&all, &measured) + single))
-    };
-    let of_drivers = |config: &TrafficConfig| -> Result<f64, TrafficError> {
+        Ok(sum / (DRIVES as usize * self.each.len()) as f64)
+    }
+
+    /// How far bounded traffic is from its own recording, mean of them, and from the rate of lane
+    /// changes of all.
+    fn bounded(&self, config: &TrafficConfig) -> Result<f64, TrafficError> {
         let (mut together, mut apart) = (Samples::default(), 0.0);
-        for (boundary, road, samples) in &bounded {
-            let own = drive_bounded(road, config, boundary, BOUNDED_DRIVES)?;
-            apart += distance(&own, samples) / bounded.len() as f64;
+        for p in &self.each {
+            let own = drive_bounded(p.road, config, &p.boundary, BOUNDED_DRIVES)?;
+            apart += distance(&own, &p.samples) / self.each.len() as f64;
             together.append(&own);
         }
-        let (rate, wanted) = (together.lane_changes_1_km(), measured.lane_changes_1_km());
+        let (rate, wanted) = (together.lane_changes_1_km(), self.together.lane_changes_1_km());
         let changes = (rate - wanted).abs() / (rate + wanted).max(1e-9);
         Ok(apart + LANE_CHANGE_WEIGHT * changes)
-    };
-    let bounds = BOUNDS.map(|(_, low, high)| (low, high));
-    let mut knobs = guess(&start, &measured);
-    // First the drivers, in the bounded traffic, which does not depend on the rest.
-    let with_drivers = |drivers: &[f64; DRIVERS]| -> Knobs {
-        std::array::from_fn(|k| drivers.get(k).copied().unwrap_or(knobs[k]))
-    };
-    let drivers = search::minimum(
-        &std::array::from_fn(|k| bounds[k]),
-        &std::array::from_fn(|k| knobs[k]),
-        effort.generations,
-        effort.seed,
-        |drivers| of_drivers(&turned(&start, &with_drivers(drivers))),
-    )?;
-    knobs = with_drivers(&drivers.best);
-    // Then, with these drivers, the speed beyond the end of the free traffic.
-    let with_beyond = |beyond: &[f64; BEYOND]| {
-        let mut all = knobs;
-        all[DRIVERS..].copy_from_slice(beyond);
-        all
-    };
-    let beyond = search::minimum(
-        &std::array::from_fn(|k| bounds[DRIVERS + k]),
-        &std::array::from_fn(|k| knobs[DRIVERS + k]),
-        effort.generations / 4,
-        effort.seed.wrapping_add(1),
-        |beyond: &[f64; BEYOND]| of_free(&turned(&start, &with_beyond(beyond))),
-    )?;
-    let config = turned(&start, &with_beyond(&beyond.best));
-    let distance = of_drivers(&config)?;
-    Ok(Calibration { config, distance, trials: drivers.trials + beyond.trials })
+    }
 }
 
 /// The weighted sum of distances.
@@ -189,157 +250,14 @@ pub fn distance(a: &Samples, b: &Samples) -> f64 {
         .sum()
 }
 
-/// Native traffic alone on a road for a while after its warm-up, looked at twice a second.
-///
-/// # Errors
-/// [`TrafficError`] for a configuration or road that cannot be used.
-pub fn drive(
-    road: &Arc<Road>,
-    config: TrafficConfig,
-    duration_s: f64,
-) -> Result<Samples, TrafficError> {
-    let config = TrafficConfig { sees_ego: false, scene_radius_m: 1e5, ..config };
-    let mut traffic = NativeTraffic::new(Arc::clone(road), Geometry::default(), config)?;
-    observe(&mut traffic, road, duration_s)
-}
-
-/// Native traffic between the measured start, arrivals and end of a recording, for as long as the
-/// recording, `drives` times with seeds of their own; the samples of all drives.
-///
-/// # Errors
-/// As [`drive`].
-pub fn drive_bounded(
-    road: &Arc<Road>,
-    config: &TrafficConfig,
-    boundary: &Arc<Boundary>,
-    drives: u64,
-) -> Result<Samples, TrafficError> {
-    let mut all = Samples::default();
-    for k in 0..drives {
-        let seed = config.seed.wrapping_add(k);
-        let config = TrafficConfig { sees_ego: false, scene_radius_m: 1e5, seed, ..config.clone() };
-        let (road, geometry) = (Arc::clone(road), Geometry::default());
-        let mut traffic =
-            NativeTraffic::bounded(Arc::clone(&road), geometry, config, Arc::clone(boundary))?;
-        let samples = observe(&mut traffic, &road, boundary.duration_s())?;
-        if k == 0 { all = samples } else { all.append(&samples) }
-    }
-    Ok(all)
-}
-
-fn observe(
-    traffic: &mut NativeTraffic,
-    road: &Road,
-    duration_s: f64,
-) -> Result<Samples, TrafficError> {
-    let ego = EgoState { s_m: 0.5 * road.length_m(), ..EgoState::default() };
-    let mut observer = Observer::default();
-    for k in 0..=(duration_s * 10.0) as u64 / LOOK_TICKS {
-        let now = Time((k * LOOK_TICKS * 100_000_000) as i64);
-        observer.look(traffic.advance(now, &ego)?, road);
-    }
-    Ok(observer.samples)
-}
-
-/// Metres of driving lanes of a road.
-#[must_use]
-pub fn lanes_m(road: &Road) -> f64 {
-    let driven = road.lanes().iter().filter(|lane| lane.kind == road::LaneKind::Driving);
-    driven.map(|lane| lane.s_end_m - lane.s_start_m).sum()
-}
-
-/// Inflow, density, classes and lengths as measured.
-fn with_measured_demand(
-    base: &TrafficConfig,
-    lessons: &[Lesson<'_>],
-    measured: &Samples,
-) -> TrafficConfig {
-    let mut config = base.clone();
-    let lanes_m =
-        lessons.iter().map(|l| lanes_m(l.road)).sum::<f64>() / lessons.len().max(1) as f64;
-    let density_1_km = measured.density_1_km(lanes_m);
-    // Demand a little above the measured flow: the queue before the stretch is always there when
-    // the flow is set by the congestion beyond it.
-    let flow_1_s = 1.05 * measured.flow_1_h(lanes_m) / 3600.0;
-    config.spawn_probability = (flow_1_s * config.spawn_interval_s).clamp(0.0, 1.0);
-    config.initial_density_1_km = Some(density_1_km.min(120.0));
-    // Long enough for the speed beyond the end to reach back over a stretch of a kilometre.
-    config.warm_up_s = 150.0;
-    let tracks = || lessons.iter().flat_map(|l| &l.recording.tracks);
-    let share = |class| {
-        tracks().filter(|t| t.class == class).count() as f64 / tracks().count().max(1) as f64
-    };
-    config.truck_share_frac = share(VehicleClass::Truck);
-    config.van_share_frac = share(VehicleClass::Van).min(1.0 - config.truck_share_frac);
-    for (class, own) in [
-        (VehicleClass::Car, &mut config.car),
-        (VehicleClass::Van, &mut config.van),
-        (VehicleClass::Truck, &mut config.truck),
-    ] {
-        let lengths: Vec<f64> = tracks().filter(|t| t.class == class).map(|t| t.length_m).collect();
-        if let Some(m) = crate::stats::moments(&lengths) {
-            own.length_m = m.mean.clamp(1.0, 40.0);
-            own.length_spread_m = (1.7 * m.sigma).min(0.4 * own.length_m);
-        }
-    }
-    config
-}
-
-/// Where the search begins: what can be read off the samples.
-fn guess(start: &TrafficConfig, measured: &Samples) -> Knobs {
-    let speed = crate::stats::moments(measured.of(Quantity::Speed)).unwrap_or_default();
-    let wish = [1.2 * speed.p95, 0.12, start.car.headway_s, start.car.min_gap_m];
-    let car = start.car;
-    let follow = [car.accel_m_s2, car.decel_m_s2];
-    let change = [car.politeness_frac, car.threshold_m_s2, car.right_bias_m_s2];
-    let beyond = [speed.mean, speed.sigma, 12.0];
-    let all: Vec<f64> = wish.into_iter().chain(follow).chain(change).chain(beyond).collect();
-    std::array::from_fn(|k| {
-        let (_, low, high) = BOUNDS[k];
-        all.get(k).copied().unwrap_or(low).clamp(low, high)
-    })
-}
-
-/// The traffic with these values. Vans and trucks keep their proportions to cars.
-fn turned(start: &TrafficConfig, knobs: &Knobs) -> TrafficConfig {
-    let [max_speed, sigma, headway, gap, accel, decel, rest @ ..] = *knobs;
-    let [politeness, threshold, bias, out_speed, out_sigma, out_period] = rest;
-    let mut config = start.clone();
-    let car = start.car;
-    let change = |c: &mut ClassConfig| {
-        c.speed_factor_sigma_frac = sigma.min(0.24 * c.speed_factor_frac);
-        c.headway_s = (c.headway_s * headway / car.headway_s).clamp(0.3, 10.0);
-        c.min_gap_m = (c.min_gap_m * gap / car.min_gap_m).clamp(0.5, 20.0);
-        c.accel_m_s2 = (c.accel_m_s2 * accel / car.accel_m_s2).clamp(0.1, 6.0);
-        c.decel_m_s2 = (c.decel_m_s2 * decel / car.decel_m_s2).clamp(0.3, 5.0);
-        (c.politeness_frac, c.threshold_m_s2, c.right_bias_m_s2) = (politeness, threshold, bias);
-        c.safe_decel_m_s2 = c.safe_decel_m_s2.min(c.max_decel_m_s2);
-    };
-    for class in [&mut config.car, &mut config.van, &mut config.truck] {
-        change(class);
-    }
-    config.max_speed_m_s = max_speed;
-    config.outflow_speed_m_s = Some(out_speed);
-    (config.outflow_sigma_m_s, config.outflow_period_s) = (out_sigma, out_period);
-    config
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::native::{ClassConfig, NativeTraffic};
     use crate::replay::{Frame, Row};
     use crate::stats::observe_recording;
     use road::builtin;
-
-    #[test]
-    fn every_corner_of_the_search_is_a_valid_configuration() {
-        let start = TrafficConfig::default();
-        for high in [false, true] {
-            let corner: Knobs =
-                std::array::from_fn(|k| if high { BOUNDS[k].2 } else { BOUNDS[k].1 });
-            turned(&start, &corner).validate().unwrap();
-        }
-    }
+    use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
 
     #[test]
     fn a_jam_beyond_the_end_of_the_road_reaches_back_over_it() {

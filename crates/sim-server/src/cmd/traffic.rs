@@ -237,9 +237,11 @@ fn calibrated(
     let mut scenario = scenario;
     scenario.name = format!("{}-calibrated", scenario.name);
     scenario.description = format!(
-        "Native drivers calibrated to {} recordings: weighted distance {:.3} after {} trials.",
+        "Native drivers calibrated to {} recordings: weighted distance {:.3} in bounded and {:.3} in \
+         free traffic after {} trials.",
         learned.recordings.len(),
         found.distance,
+        found.free_distance,
         found.trials
     );
     scenario.road = format!("recording:{}", args.lanes);

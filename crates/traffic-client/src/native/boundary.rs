@@ -122,6 +122,17 @@ impl Boundary {
         self.arrivals.len() - self.at_start()
     }
 
+    /// Speeds at which vehicles come in at the start of the road, m/s.
+    pub(crate) fn inflow_m_s(&self) -> impl Iterator<Item = f64> {
+        let at_start = |a: &&Arrival| a.tick > 0 && a.s_m < BEYOND_M;
+        self.arrivals.iter().filter(at_start).map(|a| a.speed_m_s)
+    }
+
+    /// Speeds at its end, of each lane and tick, m/s.
+    pub(crate) fn outflow_m_s(&self) -> impl Iterator<Item = f64> {
+        self.beyond_m_s.iter().flatten().copied().filter(|v| v.is_finite())
+    }
+
     /// Speed beyond the end of each lane at a tick, m/s.
     pub(crate) fn beyond_m_s(&self, tick: u64) -> &[f64] {
         let k = (tick as usize).min(self.beyond_m_s.len().saturating_sub(1));

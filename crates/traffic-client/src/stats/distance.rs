@@ -52,6 +52,15 @@ pub fn kolmogorov_smirnov(a: &[f64], b: &[f64]) -> Option<f64> {
     (!a.is_empty() && !b.is_empty()).then_some(most)
 }
 
+/// What the Kolmogorov-Smirnov distance of two sets of independent samples of *one* distribution
+/// stays below in 95 % of cases: `1.358 sqrt((n + m) / (n m))`, at most 1 (Smirnov 1948). A distance
+/// below it says nothing. 1 for an empty set.
+#[must_use]
+pub fn kolmogorov_smirnov_by_chance(n: usize, m: usize) -> f64 {
+    let (n, m) = (n as f64, m as f64);
+    (1.358 * libm::sqrt((n + m) / (n * m))).min(1.0)
+}
+
 /// The Wasserstein-1 distance in the unit of the samples; `None` if a set is empty.
 #[must_use]
 pub fn wasserstein(a: &[f64], b: &[f64]) -> Option<f64> {
@@ -105,6 +114,21 @@ pub fn moments(values: &[f64]) -> Option<Moments> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn samples_of_one_distribution_differ_by_more_than_chance_in_one_case_of_twenty() {
+        let draws = |trial: u64, first: u32, n: u32| -> Vec<f64> {
+            let d = crate::philox::Draws::new(trial, crate::philox::Stream::Search, 0);
+            (first..first + n).map(|k| d.uniform(k)).collect()
+        };
+        let (n, m, trials) = (40u32, 60u32, 2000);
+        let bound = kolmogorov_smirnov_by_chance(n as usize, m as usize);
+        let above = (0..trials)
+            .filter(|&t| kolmogorov_smirnov(&draws(t, 0, n), &draws(t, n, m)).unwrap() > bound)
+            .count();
+        let part = above as f64 / trials as f64;
+        assert!((0.02..0.06).contains(&part), "{part}");
+    }
 
     fn grid(n: usize, from: f64, to: f64) -> Vec<f64> {
         (0..n).map(|k| from + (to - from) * (k as f64 + 0.5) / n as f64).collect()

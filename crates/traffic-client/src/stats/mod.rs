@@ -7,5 +7,7 @@
 mod distance;
 mod observer;
 
-pub use distance::{Moments, kolmogorov_smirnov, moments, wasserstein};
+pub use distance::{
+    Moments, kolmogorov_smirnov, kolmogorov_smirnov_by_chance, moments, wasserstein,
+};
 pub use observer::{Observer, QUANTITIES, Quantity, Samples, observe_recording};
