@@ -25,7 +25,8 @@ impl Reference {
     ) -> Self {
         let mut tolerance = [0.0; PARAMS];
         for (t, s) in tolerance.iter_mut().zip(&SPECS) {
-            *t = s.scatter();
+            // Without drives in order, what is calibrated on them is not known either.
+            *t = if clean { s.scatter() } else { s.scatter().hypot(s.calibration) };
         }
         let whiteners = fit_whiteners(drives, residuals, true);
         Self {
