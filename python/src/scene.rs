@@ -7,12 +7,14 @@ use tractrix_core::{Neighbour, VehicleClass};
 
 /// Characters of the longest class, `truck`.
 const CLASS_CHARS: usize = 5;
+/// Bytes of a row.
+const ROW_BYTES: usize = 8 + 4 * CLASS_CHARS + 7 * 8 + 2 * 4 + 3 * 8;
 /// `target_lane` of a vehicle that keeps its lane.
 const NO_LANE: i32 = -1;
 
 /// The rows of a scene.
 pub(crate) fn rows(neighbours: &[Neighbour]) -> Vec<u8> {
-    let mut out = Vec::new();
+    let mut out = Vec::with_capacity(neighbours.len() * ROW_BYTES);
     for n in neighbours {
         out.extend(n.id.to_le_bytes());
         let mut class = match n.class {
