@@ -48,11 +48,13 @@ const SETTINGS: [[f64; 7]; 8] = [
     [7.8e3, 250.0, 25.0, 0.011, 0.001, 24.0, 0.80],
 ];
 
-/// A set of drives of the truck with hidden effects.
+/// A set of drives of the truck with hidden effects. Every drive has random numbers of its own: road,
+/// load, weather and tolerances are the same whatever is hidden.
 pub(crate) fn generate(hidden: &[Effect], campaign: &Campaign, seed: u64) -> DriveSet {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let drives = (0..campaign.drives)
         .map(|i| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(i as u64);
             let [payload, altitude, air, hills, climb, cruise, stage] = SETTINGS[i % 8];
             let setting = Setting {
                 payload_kg: payload * between(&mut rng, 0.97, 1.03),
