@@ -24,7 +24,7 @@ use rand_chacha::ChaCha8Rng;
 use support::effects::{Effect, Magnitude, SIZES, Shape, hide};
 use support::outside::OUTSIDE;
 use support::random::{between, sign};
-use support::{Campaign, generate};
+use support::{Campaign, generate_apart};
 
 const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR]";
 
@@ -316,7 +316,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (from, to) = (number("from=", 0)?, number("to=", usize::MAX)?);
     let plant = Plant::of_truck(&TruckParameters::load("reference")?)?;
     let usual = Campaign { drives: 8, ..campaign };
-    let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
+    let clean = generate_apart(&[], &usual, seed.wrapping_mul(7919) + 1);
     let baseline = Baseline::learn(&plant, &clean, &Serial)?;
     let mut t = Table::default();
     for case in 0..count.min(to) {
@@ -326,7 +326,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if case < from || !listed(case) {
             continue;
         }
-        let mut set = generate(&hidden, &campaign, case_seed);
+        let mut set = generate_apart(&hidden, &campaign, case_seed);
         if let Some(without) = option("without=") {
             for name in without.split(',') {
                 let channel = Channel::of(name).ok_or_else(|| format!("no channel {name}"))?;
@@ -356,7 +356,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         // The same roads, loads, weather and tolerances without what is hidden: the error that is
         // left there is what the true model leaves.
         let oracle = d.gain.as_ref().filter(|_| kind != "outside").map(|g| {
-            let twin = generate(&[], &campaign, case_seed);
+            let twin = generate_apart(&[], &campaign, case_seed);
             let held = twin.drives.iter().filter(|d| g.held_out.contains(&d.name));
             baseline.speed_rmse_m_s(&plant, held)
         });

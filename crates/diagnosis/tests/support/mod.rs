@@ -14,7 +14,7 @@ pub(crate) mod random;
 pub(crate) mod road;
 pub(crate) mod sheet;
 
-use diagnosis::DriveSet;
+use diagnosis::{Drive, DriveSet};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
@@ -48,27 +48,39 @@ const SETTINGS: [[f64; 7]; 8] = [
     [7.8e3, 250.0, 25.0, 0.011, 0.001, 24.0, 0.80],
 ];
 
-/// A set of drives of the truck with hidden effects. Every drive has random numbers of its own: road,
-/// load, weather and tolerances are the same whatever is hidden.
+/// A set of drives of the truck with hidden effects.
 pub(crate) fn generate(hidden: &[Effect], campaign: &Campaign, seed: u64) -> DriveSet {
-    let drives = (0..campaign.drives)
-        .map(|i| {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            rng.set_stream(i as u64);
-            let [payload, altitude, air, hills, climb, cruise, stage] = SETTINGS[i % 8];
-            let setting = Setting {
-                payload_kg: payload * between(&mut rng, 0.97, 1.03),
-                altitude_m: altitude + 30.0 * normal(&mut rng),
-                air_degc: air + 2.0 * normal(&mut rng),
-                hills: hills * between(&mut rng, 0.8, 1.2),
-                climb,
-                cruise,
-                engine_brake: stage,
-                warm: i % 3 == 2,
-            };
-            let name = format!("drive_{i}");
-            drive::drive(&name, hidden, &setting, campaign.duration_s, campaign.tolerance, &mut rng)
-        })
-        .collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    set((0..campaign.drives).map(|i| one(i, hidden, campaign, &mut rng)).collect())
+}
+
+/// The same with random numbers of its own for every drive: road, load, weather and tolerances are
+/// the same whatever is hidden.
+pub(crate) fn generate_apart(hidden: &[Effect], campaign: &Campaign, seed: u64) -> DriveSet {
+    let drives = (0..campaign.drives).map(|i| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        rng.set_stream(i as u64);
+        one(i, hidden, campaign, &mut rng)
+    });
+    set(drives.collect())
+}
+
+fn set(drives: Vec<Drive>) -> DriveSet {
     DriveSet { truck: "reference".to_owned(), drives, findings: Vec::new() }
+}
+
+fn one(i: usize, hidden: &[Effect], campaign: &Campaign, rng: &mut ChaCha8Rng) -> Drive {
+    let [payload, altitude, air, hills, climb, cruise, stage] = SETTINGS[i % 8];
+    let setting = Setting {
+        payload_kg: payload * between(rng, 0.97, 1.03),
+        altitude_m: altitude + 30.0 * normal(rng),
+        air_degc: air + 2.0 * normal(rng),
+        hills: hills * between(rng, 0.8, 1.2),
+        climb,
+        cruise,
+        engine_brake: stage,
+        warm: i % 3 == 2,
+    };
+    let name = format!("drive_{i}");
+    drive::drive(&name, hidden, &setting, campaign.duration_s, campaign.tolerance, rng)
 }
