@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use road::{Road, builtin};
-use tractrix_core::{EgoState, Geometry, Scene, Time, TrafficSource};
+use tractrix_core::{EgoState, Geometry, Neighbour, Scene, Time, TrafficSource};
 use traffic_client::TrafficError;
 use traffic_client::native::{Density, TrafficConfig};
 use traffic_client::sumo::codec::Value;
@@ -269,6 +269,35 @@ fn types_routes_and_traffic_lights_are_reachable() {
     assert_eq!(sumo.get(id::VEHICLE_TYPE, var::MAX_SPEED, "truck").unwrap(), Value::Double(20.0));
     let e = sumo.get(id::VEHICLE, var::SPEED, "nobody").unwrap_err();
     assert!(matches!(e, TrafficError::Sumo(SumoError::Refused { .. })), "{e}");
+}
+
+/// The example of the documentation was refused: SUMO takes `--lateral-resolution` or the
+/// `--lanechange.duration` that we set, not both.
+#[test]
+fn the_sublane_model_and_another_car_following_model_can_be_chosen() {
+    if !sumo_is_here() {
+        return;
+    }
+    let folder = Folder::new("sublane");
+    let road = Arc::new(builtin::flat(4000.0));
+    let attributes = [("carFollowModel", "Krauss"), ("lcAssertive", "2")];
+    let attributes = attributes.map(|(k, v)| (k.to_owned(), v.to_owned())).into();
+    let config = SumoConfig {
+        traffic: TrafficConfig::family(Density::Medium, 15.0, 4),
+        options: ["--lateral-resolution", "0.8"].map(str::to_owned).to_vec(),
+        type_attributes: [("car".to_owned(), attributes)].into(),
+        ..SumoConfig::default()
+    };
+    let mut sumo = SumoTraffic::new(road.clone(), truck(), config, &folder.0).unwrap();
+    let mut beside_the_middle = 0;
+    drive(&mut sumo, &road, 300, |_, scene| {
+        let off = |n: &&Neighbour| {
+            let middle = road.lanes()[usize::from(n.lane)].center_d_m(0.0);
+            (n.d_m - middle).abs() > 0.05
+        };
+        beside_the_middle += scene.neighbours.iter().filter(off).count();
+    });
+    assert!(beside_the_middle > 0, "nobody uses the width of the lane");
 }
 
 #[test]

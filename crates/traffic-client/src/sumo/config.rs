@@ -32,6 +32,11 @@ pub struct SumoConfig {
 pub type TypeAttributes = BTreeMap<String, BTreeMap<String, String>>;
 
 impl SumoConfig {
+    /// Whether the user sets an option of SUMO, as `--name value` or `--name=value`.
+    pub(super) fn has_option(&self, name: &str) -> bool {
+        self.options.iter().any(|o| o.split('=').next() == Some(name))
+    }
+
     /// SUMO itself says nothing of a missing file before it is gone, so this is said here.
     pub(super) fn check_files_and_types(&self) -> Result<(), TrafficError> {
         let bad = |why: String| Err(TrafficError::Config { why });

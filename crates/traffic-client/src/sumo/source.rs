@@ -141,8 +141,12 @@ impl SumoTraffic {
         options.extend(["--seed".to_owned(), (self.config.traffic.seed & 0x7fff_ffff).to_string()]);
         let fixed = "--step-length 0.1 --thread-rngs 64 --no-step-log --duration-log.disable \
              --no-warnings --xml-validation never --time-to-teleport -1 --collision.action none \
-             --lanechange.duration 3 --default.speeddev 0.1";
+             --default.speeddev 0.1";
         options.extend(fixed.split_whitespace().map(str::to_owned));
+        // In SUMO's sublane model the lateral speed decides, and both options are refused.
+        if !self.config.has_option("--lateral-resolution") {
+            options.extend(["--lanechange.duration", "3"].map(str::to_owned));
+        }
         options.extend(self.config.options.iter().cloned());
         options
     }
