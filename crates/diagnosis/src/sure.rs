@@ -47,6 +47,10 @@ const CATCH_ALL_PART: f64 = 0.05;
 /// left: noise that comes and goes gives every signal something.
 const FOLLOWS: f64 = 0.05;
 
+/// Modules whose measured quantity is an input of others: torque and pressure of the force balance,
+/// speed of all, yaw rate of the heading.
+const DRIVES_OTHERS: [Module; 4] = [Module::Torque, Module::Brake, Module::Force, Module::Yaw];
+
 /// How sure a set of named causes is against what the catalogue does not have.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Sure {
@@ -96,7 +100,7 @@ fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Opti
         }
         let accounted = left < UNKNOWN_EVIDENCE && best_rest < ACCOUNTED * best_bare;
         if fit.set.is_empty() || !accounted {
-            return (empty.clone(), describe(&bare), Sure::Outside);
+            return (elsewhere(problem, empty, &fit, &bare), describe(&bare), Sure::Outside);
         }
     }
     if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
@@ -104,7 +108,7 @@ fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Opti
         // Causes that leave much and that one free function replaces stand in for it.
         let replaced = if share > 1 { REPLACED_MANY } else { REPLACED_ONE };
         if share > 0 && best_bare > replaced * fit.log_z {
-            return (empty.clone(), describe(&bare), Sure::Outside);
+            return (elsewhere(problem, empty, &fit, &bare), describe(&bare), Sure::Outside);
         }
         let sure = match (fit.set.is_empty(), share) {
             (true, _) => Sure::Outside,
@@ -121,6 +125,27 @@ fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Opti
         return (fit, Some(noise(&random)), sure);
     }
     (fit, None, Sure::Yes)
+}
+
+/// The causes that do not show where the best free function wins: it says nothing about them,
+/// unless what is measured there drives the replay of other modules.
+fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fit {
+    let Some(won) = won.first().filter(|w| !DRIVES_OTHERS.contains(&w.module)) else {
+        return empty.clone();
+    };
+    let mut left = fit.clone();
+    let mut i = 0;
+    while i < left.set.len() {
+        let groups = CATALOGUE[left.set[i]].groups();
+        if !groups.iter().any(|g| g.modules().contains(&won.module)) {
+            i += 1;
+            continue;
+        }
+        let (fewer, theta) = problem.without(&left, i);
+        let Some(refit) = problem.fit(&fewer, &theta, empty.norm) else { return empty.clone() };
+        left = refit;
+    }
+    if left.log_z > UNKNOWN_EVIDENCE { left } else { empty.clone() }
 }
 
 /// Free functions beyond those that drives in order have too, best first.
