@@ -136,8 +136,7 @@ fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fi
     let mut left = fit.clone();
     let mut i = 0;
     while i < left.set.len() {
-        let groups = CATALOGUE[left.set[i]].groups();
-        if !groups.iter().any(|g| g.modules().contains(&won.module)) {
+        if !shows(left.set[i], won.module) {
             i += 1;
             continue;
         }
@@ -161,13 +160,14 @@ fn beyond(problem: &Problem<'_>, mut shapes: Vec<Shape>) -> Vec<Shape> {
     shapes
 }
 
+/// A cause of the catalogue acts on a module.
+fn shows(cause: usize, module: Module) -> bool {
+    CATALOGUE[cause].groups().iter().any(|g| g.modules().contains(&module))
+}
+
 /// How many of the causes show in a module.
 fn sharing(fit: &Fit, module: Module) -> usize {
-    let shows = |h: &&usize| {
-        let groups = CATALOGUE[**h].groups();
-        groups.iter().any(|g| g.modules().contains(&module))
-    };
-    fit.set.iter().filter(shows).count()
+    fit.set.iter().filter(|h| shows(**h, module)).count()
 }
 
 /// Signs that the named causes stand in for one that the catalogue lacks: three of them share a

@@ -114,3 +114,16 @@ fn effects_outside_the_catalogue_are_unknown_with_their_signal() {
         assert_eq!((unknown.quantity, unknown.signals[0]), (quantity, signal), "{kind:?}");
     }
 }
+
+/// An unknown in the fuel, with more evidence than all causes, took a steering ratio away with it.
+#[test]
+fn an_unknown_in_the_fuel_leaves_the_causes_of_the_steering_named() {
+    let outside = Effect::Outside { kind: Outside::FuelTime, size: 0.3, shape: Shape([0.5; 4]) };
+    let d = judge(&drives(&[outside, cause("steering_ratio", -0.12)], 37)).unwrap();
+    assert_eq!(d.verdict, Verdict::Unknown);
+    let ids: Vec<&str> = d.causes.iter().map(|c| c.id).collect();
+    assert_eq!(ids, ["steering_ratio"]);
+    let ratio = d.causes[0].parameters["ratio_scale"];
+    assert!((ratio.value - 0.88).abs() < 4.0 * ratio.sigma, "{ratio:?}");
+    assert_eq!(d.unknown.unwrap().quantity, "fuel_rate_g_s");
+}
