@@ -435,7 +435,7 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
                 .copied()
                 .filter(|o| fit.set.iter().all(|s| CATALOGUE[*s].id != CATALOGUE[*o].id))
                 .collect();
-            for c in problem.screen(f, &rest) {
+            for c in problem.screen(f, &rest).singles(None) {
                 let id = CATALOGUE[c.hypothesis].id;
                 let lost = evidence - c.gain;
                 if lost < 5.0 && confused_with.iter().all(|x: &Confusion| x.id != id) {

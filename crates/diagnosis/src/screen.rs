@@ -1,5 +1,5 @@
-//! What every hypothesis, and every pair of hypotheses, would add to a fit: secant sensitivities at
-//! the fitted point, one Gram matrix, linear evidence.
+//! What every hypothesis, and every pair of hypotheses, would add to a fit, or put in place of one of
+//! its members: secant sensitivities at the fitted point, one Gram matrix, linear evidence.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,20 +19,20 @@ pub(crate) struct Candidate {
 }
 
 /// One way to try a hypothesis: its columns in a [`Screen`].
-struct Trial {
+pub(crate) struct Trial {
     hypothesis: usize,
     start: Start,
     at: Vec<usize>,
 }
 
 /// Information and gradient of many directions at a fit; the fit's own parameters come first.
-struct Screen {
+pub(crate) struct Screen {
+    fit: Fit,
     a: DMatrix<f64>,
+    /// Gradient at no effect in the linear model.
     b: DVector<f64>,
     dirs: Vec<Direction>,
     columns: Vec<Trial>,
-    /// Linear evidence of the fit's own parameters.
-    base: f64,
 }
 
 /// Hypotheses of `open` whose id is not in the set.
@@ -43,32 +43,30 @@ pub(crate) fn outside(fit: &Fit, open: &[usize]) -> Vec<usize> {
         .collect()
 }
 
-impl Problem<'_> {
-    /// Gains of all hypotheses in `open` at the fit, best first.
-    pub(crate) fn screen(&self, fit: &Fit, open: &[usize]) -> Vec<Candidate> {
-        let screen = self.sensitivities(fit, open);
-        let mut out: Vec<Candidate> = screen
-            .columns
-            .iter()
-            .filter_map(|c| {
-                let gain = self.linear_gain(fit, &screen, &[c])?;
-                Some(Candidate { hypothesis: c.hypothesis, start: c.start, gain })
-            })
-            .collect();
+impl Screen {
+    /// Gains of all hypotheses over the fit, or over the fit without its `without`-th member, best
+    /// first.
+    pub(crate) fn singles(&self, without: Option<usize>) -> Vec<Candidate> {
+        let (own, base) = self.own(without);
+        let gain = |c: &Trial| {
+            let gain = self.gain(&own, base, &[c])?;
+            Some(Candidate { hypothesis: c.hypothesis, start: c.start, gain })
+        };
+        let mut out: Vec<Candidate> = self.columns.iter().filter_map(gain).collect();
         out.sort_by(|x, y| y.gain.total_cmp(&x.gain));
         out
     }
 
-    /// Gains of all pairs of hypotheses in `open` at the fit, best first, one per pair of ids.
-    pub(crate) fn screen_pairs(&self, fit: &Fit, open: &[usize]) -> Vec<[Candidate; 2]> {
-        let screen = self.sensitivities(fit, open);
+    /// The same of all pairs of hypotheses, one per pair of ids.
+    pub(crate) fn pairs(&self, without: Option<usize>) -> Vec<[Candidate; 2]> {
+        let (own, base) = self.own(without);
         let mut out: Vec<[Candidate; 2]> = Vec::new();
-        for (i, x) in screen.columns.iter().enumerate() {
-            for y in &screen.columns[..i] {
+        for (i, x) in self.columns.iter().enumerate() {
+            for y in &self.columns[..i] {
                 if CATALOGUE[x.hypothesis].id == CATALOGUE[y.hypothesis].id {
                     continue;
                 }
-                if let Some(gain) = self.linear_gain(fit, &screen, &[x, y]) {
+                if let Some(gain) = self.gain(&own, base, &[x, y]) {
                     out.push([x, y].map(|c| Candidate {
                         hypothesis: c.hypothesis,
                         start: c.start,
@@ -88,8 +86,47 @@ impl Problem<'_> {
         out
     }
 
+    /// Linear evidence that the fit loses without a member.
+    pub(crate) fn lost(&self, member: Option<usize>) -> f64 {
+        self.own(None).1 - self.own(member).1
+    }
+
+    /// Columns of the fit's members but one, and their linear evidence.
+    fn own(&self, without: Option<usize>) -> (Vec<usize>, f64) {
+        let gone = without.and_then(|i| self.fit.set.get(i));
+        let stays = |p: P| gone.is_none_or(|h| CATALOGUE[*h].params().all(|q| q != p));
+        let own: Vec<usize> =
+            (0..self.fit.free.len()).filter(|j| stays(self.fit.free[*j])).collect();
+        let base = self.linear(&own).map_or(0.0, |x| x.0);
+        (own, base)
+    }
+
+    /// What the trials add in the linear model; `None` where a sign is wrong.
+    fn gain(&self, own: &[usize], base: f64, trials: &[&Trial]) -> Option<f64> {
+        let added = trials.iter().flat_map(|t| t.at.iter().copied());
+        let keep: Vec<usize> = own.iter().copied().chain(added).collect();
+        let (z, x) = self.linear(&keep)?;
+        let mut at = own.len();
+        for t in trials {
+            let sign = CATALOGUE[t.hypothesis].sign;
+            if sign != 0.0 && x[at] * sign < 0.0 {
+                return None;
+            }
+            at += t.at.len();
+        }
+        Some(z - base)
+    }
+
+    /// Linear evidence of columns, the prior centred at no effect.
+    fn linear(&self, keep: &[usize]) -> Option<(f64, DVector<f64>)> {
+        let ps: Vec<P> = keep.iter().map(|i| self.dirs[*i].p).collect();
+        evidence::linear(&evidence::sub(&self.a, keep), &evidence::pick(&self.b, keep), &prior(&ps))
+    }
+}
+
+impl Problem<'_> {
     /// Gram matrix of the free parameters and of the directions of all hypotheses in `open`.
-    fn sensitivities(&self, fit: &Fit, open: &[usize]) -> Screen {
+    pub(crate) fn screen(&self, fit: &Fit, open: &[usize]) -> Screen {
         let mut dirs = directions(&fit.free, &fit.theta);
         let mut columns: Vec<Trial> = Vec::new();
         for h in open {
@@ -119,47 +156,12 @@ impl Problem<'_> {
         }
         let (gram, _) = self.gram(&fit.theta, &dirs);
         let (a, b, _) = gram.sum(|_| true);
-        let k = fit.free.len();
-        let own: Vec<usize> = (0..k).collect();
-        let base = self.linear(fit, &a, &b, &own, &dirs).map_or(0.0, |x| x.0);
-        Screen { a, b, dirs, columns, base }
-    }
-
-    /// What the trials add to the fit in the linear model; `None` where a sign is wrong.
-    fn linear_gain(&self, fit: &Fit, screen: &Screen, trials: &[&Trial]) -> Option<f64> {
-        let k = fit.free.len();
-        let keep: Vec<usize> =
-            (0..k).chain(trials.iter().flat_map(|t| t.at.iter().copied())).collect();
-        let (z, x) = self.linear(fit, &screen.a, &screen.b, &keep, &screen.dirs)?;
-        let mut at = k;
-        for t in trials {
-            let sign = CATALOGUE[t.hypothesis].sign;
-            if sign != 0.0 && x[at] * sign < 0.0 {
-                return None;
-            }
-            at += t.at.len();
-        }
-        Some(z - screen.base)
-    }
-
-    /// Linear evidence around the fit with the prior centred at no effect.
-    fn linear(
-        &self,
-        fit: &Fit,
-        a: &DMatrix<f64>,
-        b: &DVector<f64>,
-        keep: &[usize],
-        dirs: &[Direction],
-    ) -> Option<(f64, DVector<f64>)> {
-        let zero = &self.reference.theta;
-        let ps: Vec<P> = keep.iter().map(|i| dirs[*i].p).collect();
-        let (a, b) = (evidence::sub(a, keep), evidence::pick(b, keep));
         // Residual at zero in the linear model: r0 = r + G (theta - zero) for the free ones.
-        let k = fit.free.len();
-        let shift = DVector::from_fn(ps.len(), |i, _| {
-            if i < k { fit.theta[ps[i] as usize] - zero[ps[i] as usize] } else { 0.0 }
+        let zero = &self.reference.theta;
+        let shift = DVector::from_fn(dirs.len(), |i, _| {
+            fit.free.get(i).map_or(0.0, |p| fit.theta[*p as usize] - zero[*p as usize])
         });
-        let b0 = &b + &a * &shift;
-        evidence::linear(&a, &b0, &prior(&ps))
+        let b = &b + &a * &shift;
+        Screen { fit: fit.clone(), a, b, dirs, columns }
     }
 }

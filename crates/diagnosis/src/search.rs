@@ -13,7 +13,7 @@ use crate::hypothesis::CATALOGUE;
 use crate::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, Problem};
 use crate::replay::MODULES;
-use crate::screen::{Candidate, outside};
+use crate::screen::{Candidate, Screen, outside};
 
 /// Least evidence for a first cause, nats. Drives in order reach it with one of the catalogue's
 /// causes once in some hundred times.
@@ -153,34 +153,23 @@ impl Problem<'_> {
     /// Two causes at once where one at a time stops: every member in turn (or nothing) is replaced
     /// by the best pairs of the whole catalogue.
     fn pair_step(&self, best: &Fit, empty: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
-        let mut places: Vec<Fit> = Vec::new();
-        for i in 0..best.set.len() {
-            let (fewer, theta) = self.without(best, i);
-            places.push(if fewer.is_empty() {
-                empty.clone()
-            } else {
-                self.fit(&fewer, &theta, zero_norm)?
-            });
-        }
-        if places.is_empty() {
-            places.push(empty.clone());
-        }
-        let mut pairs: Vec<(f64, usize, [Candidate; 2])> = Vec::new();
-        for (i, f) in places.iter().enumerate() {
-            let lost = best.log_z - f.log_z;
-            let there: Vec<usize> =
-                best.set.iter().copied().filter(|h| !f.set.contains(h)).collect();
-            let fresh = |p: &[Candidate; 2]| {
-                !p.iter().all(|c| there.contains(&c.hypothesis)) && p[0].gain > 0.85 * lost
-            };
-            let found = self.screen_pairs(f, &outside(f, open));
-            let found = found.into_iter().filter(|p| fresh(p)).take(PAIRS);
-            pairs.extend(found.map(|p| (p[0].gain - lost, i, p)));
+        let screen = self.screen(best, &outside(best, open));
+        let places: Vec<Option<usize>> =
+            if best.set.is_empty() { vec![None] } else { (0..best.set.len()).map(Some).collect() };
+        let mut pairs: Vec<(f64, Option<usize>, [Candidate; 2])> = Vec::new();
+        for place in places {
+            let lost = screen.lost(place);
+            let found = screen.pairs(place).into_iter().filter(|p| p[0].gain > 0.85 * lost);
+            pairs.extend(found.take(PAIRS).map(|p| (p[0].gain - lost, place, p)));
         }
         pairs.sort_by(|x, y| y.0.total_cmp(&x.0));
         let mut winner: Option<Fit> = None;
-        for (_, i, pair) in pairs.iter().take(PAIRS) {
-            let Some(one) = self.with_added(&places[*i], &pair[0], zero_norm) else { continue };
+        for (_, place, pair) in pairs.iter().take(PAIRS) {
+            let there = match place.map(|i| self.without(best, i)) {
+                Some((fewer, theta)) if !fewer.is_empty() => self.fit(&fewer, &theta, zero_norm)?,
+                _ => empty.clone(),
+            };
+            let Some(one) = self.with_added(&there, &pair[0], zero_norm) else { continue };
             let Some(both) = self.with_added(&one, &pair[1], zero_norm) else { continue };
             let needed = if both.set.len() > best.set.len() {
                 self.threshold(&one, &both).max(self.threshold(best, &both))
@@ -213,7 +202,7 @@ impl Problem<'_> {
     }
 
     fn step(&self, best: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
-        let candidates = self.screen(best, &outside(best, open));
+        let candidates = self.screen(best, &outside(best, open)).singles(None);
         let top = candidates.first()?.gain;
         let mut tried: Vec<usize> = Vec::new();
         let mut winner: Option<Fit> = None;
@@ -269,6 +258,7 @@ impl Problem<'_> {
     fn drop_and_swap(&self, mut best: Fit, open: &[usize], zero_norm: f64) -> Fit {
         for round in 0..2 {
             let mut changed = false;
+            let mut screen: Option<Screen> = None;
             let mut i = 0;
             while best.set.len() > 1 && i < best.set.len() {
                 let (fewer, theta) = self.without(&best, i);
@@ -277,12 +267,13 @@ impl Problem<'_> {
                     continue;
                 };
                 if best.log_z - f.log_z < self.threshold(&f, &best) {
-                    best = f;
+                    (best, screen) = (f, None);
                     changed = true;
                     continue;
                 }
                 if round == 0 {
-                    let alternatives = self.screen(&f, &outside(&best, open));
+                    let screen_of = || self.screen(&best, &outside(&best, open));
+                    let alternatives = screen.get_or_insert_with(screen_of).singles(Some(i));
                     for c in alternatives.iter().take(2) {
                         if f.log_z + c.gain < best.log_z - 20.0 - 0.1 * (best.log_z - f.log_z) {
                             continue;
@@ -290,7 +281,7 @@ impl Problem<'_> {
                         if let Some(s) = self.with_added(&f, c, zero_norm)
                             && s.log_z > best.log_z + 1.0
                         {
-                            best = s;
+                            (best, screen) = (s, None);
                             changed = true;
                             break;
                         }
