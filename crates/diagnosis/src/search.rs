@@ -22,6 +22,9 @@ const MIN_FIRST: f64 = 6.0;
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
 /// Part of the evidence already found in the same modules that another cause must add.
 pub(crate) const RELATIVE_EVIDENCE: f64 = 0.01;
+/// Part of the improvement that a step promises by which it may miss before the sensitivities are
+/// taken anew.
+const KEPT_PROMISE: f64 = 0.1;
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
 /// Pairs refitted.
@@ -74,7 +77,9 @@ impl Problem<'_> {
                 .sum::<f64>()
         };
         let mut theta = *start;
-        let (mut gram, mut chi) = self.gram(&theta, &directions(&free, &theta));
+        // Where the sensitivities were taken: they serve as long as steps do what they promise.
+        let (mut from, mut along) = (theta, directions(&free, &theta));
+        let (mut gram, mut chi) = self.gram(&theta, &along);
         let mut best = cost(gram.sum(|_| true).2, &theta);
         for _ in 0..8 {
             if free.is_empty() {
@@ -99,7 +104,11 @@ impl Problem<'_> {
                 if c < best {
                     improved = best - c;
                     (theta, best) = (t, c);
-                    (gram, chi) = self.gram(&theta, &directions(&free, &theta));
+                    let promised = factor * (2.0 - factor) * b.dot(&step);
+                    if (improved - promised).abs() > KEPT_PROMISE * promised {
+                        (from, along) = (theta, directions(&free, &theta));
+                    }
+                    (gram, chi) = self.gram_along(&theta, &from, &along);
                     break;
                 }
                 factor *= 0.35;

@@ -78,9 +78,19 @@ impl Problem<'_> {
     /// Gram matrix of the residual at `theta` and the directions from there, and the raw
     /// (not marginal) chi-square per module.
     pub(crate) fn gram(&self, theta: &Theta, directions: &[Direction]) -> (Gram, [f64; MODULES]) {
+        self.gram_along(theta, theta, directions)
+    }
+
+    /// The same with the directions from another point.
+    pub(crate) fn gram_along(
+        &self,
+        theta: &Theta,
+        from: &Theta,
+        directions: &[Direction],
+    ) -> (Gram, [f64; MODULES]) {
         let parts = self.each(|i| {
             let mut lines = vec![self.at(i, theta)];
-            lines.extend(directions.iter().map(|d| self.line(i, theta, d)));
+            lines.extend(directions.iter().map(|d| self.line(i, from, d)));
             let (gram, common) = self.marginal(i, &lines);
             (gram, self.chi(i, &lines[0]), common)
         });
