@@ -66,7 +66,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[],
         ONE,
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::HeadingRad],
-        1.2,
+        2.0,
         0.0,
     ),
     h(

@@ -4,16 +4,14 @@
 
 use std::sync::Arc;
 
-use dynamics::SUBSTEP_S;
 use dynamics::effects::brake::friction_left_frac;
 use dynamics::effects::driveline::with_losses_n;
-use dynamics::effects::resistance::{
-    area_at_yaw_m2, cold_factor, drag_n, grade_n, on_course, rolling_n, side_n,
-};
-use dynamics::effects::table::accel_m_s2;
+use dynamics::effects::resistance::{area_at_yaw_m2, cold_factor, drag_n, grade_n, rolling_n};
 use tractrix_core::ZERO_DEGC_K;
 
+use super::air::{Wind, arctangents};
 use super::brake::PA_PER_KPA;
+use super::inputs::{BLOCK, Inputs, cut, lanes, pad, scaled};
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
 use crate::param::{P, Theta};
@@ -21,9 +19,6 @@ use crate::{Drive, Plant};
 
 /// Samples that a speed at a window's end is averaged over (two 10 Hz messages).
 pub(super) const EDGE: usize = 4;
-
-/// Samples that are computed side by side.
-pub(super) const BLOCK: usize = 128;
 
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[super::Module::Force as usize];
@@ -60,143 +55,6 @@ pub(super) fn weak_form(
         .map(|k| edge(speed, 20 * k, 0.0) * scale - edge(sum, 20 * k, lag))
         .collect();
     valid.iter().zip(left.windows(2)).map(|(ok, e)| if *ok { e[1] - e[0] } else { 0.0 }).collect()
-}
-
-/// What enters the balance and depends on no parameter, per sample, padded to whole blocks.
-#[derive(Debug, Default)]
-pub(crate) struct Inputs {
-    padded: usize,
-    speed: Vec<f64>,
-    indicated_nm: Vec<f64>,
-    friction_nm: Vec<f64>,
-    /// Auxiliaries, with the truck file's own fan.
-    auxiliary_nm: Vec<f64>,
-    /// Torque per power at the crank, Nm/W.
-    per_w: Vec<f64>,
-    engine_brake_nm: Vec<f64>,
-    /// Ratio engine to wheel over wheel radius, 1/m.
-    ratio_1_m: Vec<f64>,
-    rotating_kg: Vec<f64>,
-    density: Vec<f64>,
-    /// Cosine of the grade.
-    cos: Vec<f64>,
-    /// Rolling resistance coefficient of the truck file.
-    rolling_coeff: Vec<f64>,
-    /// Retarder and induced drag of the truck file, N, against the motion.
-    holding_n: Vec<f64>,
-    /// The truck file's fitted tables, m/s².
-    table_m_s2: Vec<f64>,
-    course_sin: Vec<f64>,
-    course_cos: Vec<f64>,
-    air_k: Vec<f64>,
-    engine_brake_frac: Vec<f64>,
-    xbr: Vec<f64>,
-    /// 1 where the driver asks for nothing.
-    coasts: Vec<f64>,
-}
-
-impl Inputs {
-    pub(super) fn new(d: &Prepared, plant: &Plant) -> Self {
-        let (engine, truck) = (&plant.engine, &plant.truck);
-        let driveline = &truck.driveline;
-        let per_gear: Vec<(f64, f64)> = (0..=driveline.gear_ratios.len() as u8)
-            .map(|g| {
-                let rotating_kg = driveline.rotating_mass_kg(truck.engine.inertia_kg_m2, g);
-                (driveline.total_ratio(g) / driveline.wheel_radius_m, rotating_kg)
-            })
-            .collect();
-        let gear = |i: usize| per_gear[if d.gear[i] < per_gear.len() { d.gear[i] } else { 0 }];
-        let (fan, holding) = (file_fan(d, plant), file_holding_n(d, plant));
-        let warmup = -Drive::STEP_S / truck.resistance.tyre_warmup_s;
-        let cold = |i: usize| if d.warm { 0.0 } else { (i as f64 * warmup).exp() };
-        let padded = d.n.next_multiple_of(BLOCK);
-        let of = |f: &dyn Fn(usize) -> f64| -> Vec<f64> { pad((0..d.n).map(f), padded) };
-        Self {
-            padded,
-            speed: of(&|i| d.speed[i]),
-            indicated_nm: of(&|i| d.torque[i] * 0.01 * truck.engine.reference_torque_nm),
-            friction_nm: of(&|i| engine.friction_nm(d.omega[i])),
-            auxiliary_nm: of(&|i| engine.auxiliary_nm(d.omega[i], fan[i])),
-            per_w: of(&|i| engine.crank_nm(1.0, d.omega[i])),
-            engine_brake_nm: of(&|i| d.engine_brake[i] * engine.engine_brake_nm(d.omega[i])),
-            ratio_1_m: of(&|i| gear(i).0),
-            rotating_kg: of(&|i| gear(i).1),
-            density: of(&|i| d.density[i]),
-            cos: of(&|i| d.slope[i]),
-            rolling_coeff: of(&|i| {
-                truck.resistance.rolling_coeff_at(d.speed[i])
-                    * cold_factor(truck.resistance.cold_tyre_extra_frac, cold(i))
-            }),
-            holding_n: pad(holding.into_iter(), padded),
-            table_m_s2: of(&|i| accel_m_s2(&plant.tables, d.speed[i], |s| d.signal(s, i))),
-            course_sin: of(&|i| d.course[i].0),
-            course_cos: of(&|i| d.course[i].1),
-            air_k: of(&|i| d.ambient[i] + ZERO_DEGC_K),
-            engine_brake_frac: of(&|i| d.engine_brake[i]),
-            xbr: of(&|i| d.xbr[i]),
-            coasts: of(&|i| if d.pedal[i] < 0.01 { 1.0 } else { 0.0 }),
-        }
-    }
-}
-
-/// Whether the truck file's own fan runs, from the measured coolant.
-fn file_fan(d: &Prepared, plant: &Plant) -> Vec<bool> {
-    let mut runs = false;
-    let steps = d.coolant.iter().map(|coolant| {
-        runs = plant.engine.fan_runs(runs, coolant + ZERO_DEGC_K);
-        runs
-    });
-    steps.collect()
-}
-
-/// Force of the truck file's own retarder, from the measured demand and speed, and the drag that
-/// its tyres' side forces induce, from the measured yaw rate, N.
-fn file_holding_n(d: &Prepared, plant: &Plant) -> Vec<f64> {
-    let (driveline, resistance) = (&plant.truck.driveline, &plant.truck.resistance);
-    let loaded = super::lateral::loaded(d, plant, &[0.0; crate::param::PARAMS]);
-    let stiffness: f64 = loaded.tyres.stiffness_n_rad(&loaded.static_axle_load_n()).iter().sum();
-    let substeps = (Drive::STEP_S / SUBSTEP_S).round() as usize;
-    let mut retarder_nm = 0.0;
-    (0..d.n)
-        .map(|i| {
-            let v = d.speed[i];
-            if driveline.retarder_torque_nm > 0.0 {
-                let target_nm = d.engine_brake[i] * driveline.retarder_limit_nm(v);
-                for _ in 0..substeps {
-                    retarder_nm = driveline.retarder_step_nm(retarder_nm, target_nm, SUBSTEP_S);
-                }
-            }
-            driveline.shaft_force_n(retarder_nm + driveline.hidden_retarder_nm(v))
-                + resistance.curve_n(d.mass_kg, v * d.yaw[i], stiffness)
-        })
-        .collect()
-}
-
-/// A signal with its last value held up to `padded` samples.
-fn pad(x: impl Iterator<Item = f64>, padded: usize) -> Vec<f64> {
-    let mut x: Vec<f64> = x.collect();
-    x.resize(padded, x.last().copied().unwrap_or(0.0));
-    x
-}
-
-#[inline(always)]
-fn cut<const L: usize>(x: &[f64], at: usize) -> &[f64; L] {
-    x.get(at..).and_then(<[f64]>::first_chunk).unwrap_or(&[0.0; L])
-}
-
-/// One value per sample of a block; a loop, which the compiler makes wide.
-#[inline(always)]
-fn lanes<const L: usize>(f: impl Fn(usize) -> f64) -> [f64; L] {
-    let mut out = [0.0; L];
-    for (j, x) in out.iter_mut().enumerate() {
-        *x = f(j);
-    }
-    out
-}
-
-#[inline(always)]
-fn scaled<const L: usize>(x: &[f64; L], factor: f64) -> [f64; L] {
-    lanes(|j| x[j] * factor)
 }
 
 /// Longitudinal balance of one drive with its parameters unpacked.
@@ -340,116 +198,6 @@ impl<'a> Longitudinal<'a> {
     }
 }
 
-/// Wind as the parameters have it, m/s: along and across the truck, and over the map.
-struct Wind {
-    head: f64,
-    to_left: f64,
-    to: [f64; 2],
-}
-
-impl Wind {
-    fn new(plant: &Plant, t: &Theta) -> Self {
-        let file = &plant.truck.resistance;
-        Self {
-            head: file.headwind_m_s + t[P::Headwind as usize],
-            to_left: file.crosswind_to_left_m_s + t[P::Crosswind as usize],
-            to: [
-                file.wind_to_x_m_s + t[P::WindX as usize],
-                file.wind_to_y_m_s + t[P::WindY as usize],
-            ],
-        }
-    }
-
-    /// Nothing blows across.
-    fn still(&self) -> bool {
-        self.to == [0.0, 0.0] && self.to_left == 0.0
-    }
-
-    /// Air speed relative to the truck: against the direction of travel, and to the left, m/s.
-    #[inline(always)]
-    fn over<const L: usize>(&self, d: &Inputs, at: usize, v: &[f64; L]) -> ([f64; L], [f64; L]) {
-        let mut along: [f64; L] = lanes(|j| v[j] + self.head);
-        let mut across = [self.to_left; L];
-        if self.to != [0.0, 0.0] {
-            let (sin, cos) = (cut::<L>(&d.course_sin, at), cut::<L>(&d.course_cos, at));
-            for j in 0..L {
-                let (behind, left) = on_course((self.to[0], self.to[1]), (sin[j], cos[j]));
-                along[j] -= behind;
-                across[j] += left;
-            }
-        }
-        (along, across)
-    }
-}
-
-/// Side force of the wind on the whole truck at the measured speed.
-pub(super) struct SideForce<'a> {
-    d: &'a Inputs,
-    wind: Wind,
-    area_m2_rad: f64,
-    speed_scale: f64,
-}
-
-impl<'a> SideForce<'a> {
-    pub(super) fn new(d: &'a Prepared, plant: &Plant, t: &Theta) -> Self {
-        Self {
-            d: &d.balance,
-            wind: Wind::new(plant, t),
-            area_m2_rad: plant.truck.resistance.side_force_area_m2_rad,
-            speed_scale: 1.0 / (1.0 + t[P::SpeedScale as usize]),
-        }
-    }
-
-    /// Force at the samples from `at` on, N, positive to the left.
-    #[inline(always)]
-    pub(super) fn block(&self, at: usize) -> [f64; BLOCK] {
-        if self.wind.still() {
-            return [0.0; BLOCK];
-        }
-        let v: [f64; BLOCK] = scaled(cut(&self.d.speed, at), self.speed_scale);
-        let (along, across) = self.wind.over(self.d, at, &v);
-        let tan: [f64; BLOCK] = lanes(|j| across[j].abs() / along[j].max(1.0));
-        let yaw = arctangents(tan);
-        let density = cut::<BLOCK>(&self.d.density, at);
-        lanes(|j| {
-            let squared = along[j] * along[j] + across[j] * across[j];
-            side_n(density[j], self.area_m2_rad, yaw[j].copysign(across[j]), squared)
-        })
-    }
-}
-
-/// Arctangents of positive numbers: by their series where all are small, as those of air yaw are
-/// in a light wind, else by the series of the half angle; one by one only beyond.
-#[inline(always)]
-fn arctangents<const L: usize>(x: [f64; L]) -> [f64; L] {
-    let largest = x.iter().fold(0.0, |a: f64, b| a.max(*b));
-    if largest <= 0.1 {
-        return lanes(|j| odd_series(x[j], 15));
-    }
-    let mut out: [f64; L] = lanes(|j| {
-        let half = x[j] / (1.0 + (1.0 + x[j] * x[j]).sqrt());
-        2.0 * odd_series(half, 27)
-    });
-    if largest > 0.5 {
-        for (out, x) in out.iter_mut().zip(x).filter(|(_, x)| *x > 0.5) {
-            *out = x.atan();
-        }
-    }
-    out
-}
-
-/// `x - x³/3 + x⁵/5 - ...` up to the power `last`: what follows is below 1e-16 of the sum for 15 up
-/// to 0.1 and for 27 up to 0.24.
-#[inline(always)]
-fn odd_series(x: f64, last: u32) -> f64 {
-    let y = x * x;
-    let mut sum = 1.0 / f64::from(last);
-    for n in (1..last).step_by(2).rev() {
-        sum = 1.0 / f64::from(n) - y * sum;
-    }
-    x * sum
-}
-
 /// Force of cold brakes at the pressure that brakes, later by the lag, N.
 fn service_n(d: &Prepared, plant: &Plant, lag_s: f64) -> Arc<[f64]> {
     d.profiles.get(Kind::Service, [lag_s, 0.0], || {
@@ -523,19 +271,4 @@ impl Prepared {
 #[inline]
 fn step(x: f64, width: f64) -> f64 {
     (0.5 + 0.5 * x / width).clamp(0.0, 1.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn arctangents_are_those_of_the_library() {
-        let of = |top: f64| -> [f64; 64] { lanes(|j| top * j as f64 / 63.0) };
-        for x in [of(0.1), of(0.5), of(40.0)] {
-            for (y, x) in arctangents(x).iter().zip(x) {
-                assert!((y - x.atan()).abs() <= 4e-16 * x.atan(), "{x}: {y} {}", x.atan());
-            }
-        }
-    }
 }

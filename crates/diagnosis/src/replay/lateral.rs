@@ -5,7 +5,8 @@ use dynamics::lateral::{LateralParameters, StateSpace, YawSideslip};
 use tractrix_core::GRAVITY_M_S2;
 
 use super::Module as M;
-use super::force::{BLOCK, SideForce};
+use super::air::SideForce;
+use super::inputs::BLOCK;
 use super::prepared::{Prepared, at_index};
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};

@@ -5,8 +5,10 @@
 //! A residual is measured minus replayed. Rows that a module cannot judge (shifts, standstill,
 //! rest) are masked by the measurement alone, never by the parameters.
 
+mod air;
 mod brake;
 pub(crate) mod force;
+mod inputs;
 mod lateral;
 mod powertrain;
 mod prepared;

@@ -4,7 +4,7 @@ use dynamics::effects::resistance::air_density_kg_m3;
 use dynamics::effects::table::TableSignal;
 use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
-use super::force::Inputs;
+use super::inputs::Inputs;
 use super::profiles::Profiles;
 use super::smooth;
 use super::{MODULES, Module as M};
