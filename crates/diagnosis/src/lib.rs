@@ -39,12 +39,10 @@ mod sure;
 mod table_trial;
 mod threads;
 mod unknown;
+mod verdict;
 
 pub use channel::Channel;
-pub use diagnosis::{
-    Baseline, BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Options, Parameter,
-    Progress, Unknown, Verdict, Wrong, diagnose, diagnose_with,
-};
+pub use diagnosis::{Baseline, Options, Progress, diagnose, diagnose_with};
 pub use drive::{Drive, DriveSet, RoadMap};
 pub use error::DiagnosisError;
 pub use executor::{Executor, Serial, collect};
@@ -58,3 +56,7 @@ pub use replay::Module;
 pub use report_models::Models;
 pub use table_trial::{TableTrial, try_table};
 pub use threads::Threads;
+pub use verdict::{
+    BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Parameter, Unknown, Verdict,
+    Wrong,
+};
