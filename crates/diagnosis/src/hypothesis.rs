@@ -228,8 +228,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "hidden_retarder",
         M,
         &[P::RetarderCoast],
-        &[],
-        ONE,
+        &[P::RetarderFrom],
+        &[[0.0, 0.0], [-4.0, 0.0]],
         &[
             C::EngineTorquePercent,
             C::EngineSpeedRpm,

@@ -112,6 +112,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("hidden_retarder", "torque_per_stage_nm") => Carry::Retarder,
         ("hidden_retarder", "force_n_per_m_s2") => Carry::BrakeDemand,
         ("hidden_retarder", "torque_nm") => Plus("driveline.hidden_retarder_torque_nm", 1.0),
+        ("hidden_retarder", "start_offset_m_s") => Plus("driveline.hidden_retarder_from_m_s", 1.0),
         ("speed_scale", "scale") => Times("instruments.speed_scale_coeff"),
         ("yaw_rate_bias", "bias_rad_s") => Plus("instruments.yaw_rate_bias_rad_s", 1.0),
         ("steering_ratio", "ratio_scale") => Times("lateral.steering.ratio"),

@@ -247,7 +247,8 @@ pub static CATALOGUE: [Cause; 34] = [
     cause!("hidden_retarder", MissingPhysics,
         "a retarder acts that the model does not have"
         / "a retarder acts that the model does not have",
-        [add("driveline.hidden_retarder_torque_nm", "Nm", 800.0, 0.0, 5_000.0)], []),
+        [add("driveline.hidden_retarder_torque_nm", "Nm", 800.0, 0.0, 5_000.0)],
+        [add("driveline.hidden_retarder_from_m_s", "m/s", 3.0, -7.0, 7.0)]),
     cause!("speed_scale", Instrument,
         "the wheel speed reads too high" / "the wheel speed reads too low",
         [scale("instruments.speed_scale_coeff", 0.02, -0.2, 0.2)], []),

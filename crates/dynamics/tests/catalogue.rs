@@ -23,7 +23,8 @@ fn extended(cause: &Cause, sizes: &[f64]) -> TruckParameters {
     base.with_overlay(&overlay).unwrap()
 }
 
-/// A drive over a road whose map is known: a climb at full load high up in the heat, braking down
+/// A drive over a road whose map is known: a climb at full load high up in the heat, coasting until
+/// it is slow, braking down
 /// the other side until the brakes are hot, then slalom; what the instruments report every 0.5 s.
 fn drive(truck: TruckParameters) -> Vec<EgoState> {
     let model = TruckModel::new(truck, PAYLOAD_KG).unwrap();
@@ -40,7 +41,7 @@ fn drive(truck: TruckParameters) -> Vec<EgoState> {
             ..RoadPatch::default()
         };
         let command = if t < 200.0 {
-            let accelerator_pedal_frac = if t % 30.0 < 24.0 { 1.0 } else { 0.1 };
+            let accelerator_pedal_frac = if t % 60.0 < 36.0 { 1.0 } else { 0.0 };
             Command { accelerator_pedal_frac, ..Command::default() }
         } else {
             let xbr_decel_m_s2 = if s.speed_m_s > 15.0 { 0.9 } else { 0.0 };

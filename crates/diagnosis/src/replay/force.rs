@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use dynamics::effects::brake::friction_left_frac;
-use dynamics::effects::driveline::with_losses_n;
+use dynamics::effects::driveline::{from_speed_frac, with_losses_n};
 use dynamics::effects::resistance::{area_at_yaw_m2, cold_factor, drag_n, grade_n, rolling_n};
 use tractrix_core::ZERO_DEGC_K;
 
@@ -76,6 +76,8 @@ pub(crate) struct Longitudinal<'a> {
     /// Loss of force per kelvin and where it begins, K: the truck file's, and the parameters'.
     fade: [(f64, f64); 2],
     retarder: [f64; 3],
+    /// Speed from which the retarder of a released accelerator acts, m/s.
+    coast_from_m_s: f64,
     parasitic_n: f64,
     grade: Arc<[f64]>,
     service_n: Arc<[f64]>,
@@ -115,6 +117,7 @@ impl<'a> Longitudinal<'a> {
                 at(P::RetarderCoast) * per_prop,
                 at(P::RetarderBrake),
             ],
+            coast_from_m_s: driveline.hidden_retarder_from_m_s + at(P::RetarderFrom),
             parasitic_n: resistance.parasitic_force_n + at(P::DragBrake),
             grade: d.grade_shifted(at(P::MapShift)),
             service_n: service_n(d, plant, at(P::PressureLag)),
@@ -173,7 +176,7 @@ impl<'a> Longitudinal<'a> {
         let (coasts, rotating) = (cut::<L>(&d.coasts, at), cut::<L>(&d.rotating_kg, at));
         let [on_stage, on_coast, on_brake] = self.retarder;
         lanes(|j| {
-            let coasting = on_coast * coasts[j] * if v[j] > 8.0 { 1.0 } else { 0.0 };
+            let coasting = on_coast * coasts[j] * from_speed_frac(v[j], self.coast_from_m_s);
             let retarder = on_stage * stage[j] + coasting + on_brake * xbr[j];
             let held = service[j] + retarder + holding[j] + self.parasitic_n;
             (force[j] - held) / (self.mass_kg + rotating[j]) + table[j]

@@ -1,6 +1,7 @@
 //! Inputs of the force balance that depend on no parameter, and work on them in blocks of samples.
 
 use dynamics::SUBSTEP_S;
+use dynamics::effects::driveline::RELEASED_PEDAL_FRAC;
 use dynamics::effects::resistance::cold_factor;
 use dynamics::effects::table::accel_m_s2;
 use tractrix_core::ZERO_DEGC_K;
@@ -83,7 +84,7 @@ impl Inputs {
             air_k: of(&|i| d.ambient[i] + ZERO_DEGC_K),
             engine_brake_frac: of(&|i| d.engine_brake[i]),
             xbr: of(&|i| d.xbr[i]),
-            coasts: of(&|i| if d.pedal[i] < 0.01 { 1.0 } else { 0.0 }),
+            coasts: of(&|i| if d.pedal[i] < RELEASED_PEDAL_FRAC { 1.0 } else { 0.0 }),
         }
     }
 }
@@ -115,7 +116,7 @@ fn file_holding_n(d: &Prepared, plant: &Plant) -> Vec<f64> {
                     retarder_nm = driveline.retarder_step_nm(retarder_nm, target_nm, SUBSTEP_S);
                 }
             }
-            driveline.shaft_force_n(retarder_nm + driveline.hidden_retarder_nm(v))
+            driveline.shaft_force_n(retarder_nm + driveline.hidden_retarder_nm(v, d.pedal[i]))
                 + resistance.curve_n(d.mass_kg, v * d.yaw[i], stiffness)
         })
         .collect()

@@ -171,6 +171,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::RetarderStage
         | P::RetarderBrake
         | P::RetarderCoast
+        | P::RetarderFrom
         | P::TorqueScale
         | P::EngineBrakeScale
         | P::SpeedLag

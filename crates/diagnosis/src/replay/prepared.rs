@@ -163,7 +163,11 @@ impl Prepared {
             slope: grade.iter().map(|g| 1.0 / (1.0 + g * g).sqrt()).collect(),
             heading,
             accel_x: get(C::AccelXMS2, 0.0),
-            pedal: get(C::AcceleratorPedalFrac, 0.0),
+            // Without the pedal, torque says whether the accelerator is released.
+            pedal: match drive.get(C::AcceleratorPedalFrac) {
+                Some(_) => get(C::AcceleratorPedalFrac, 0.0),
+                None => get(C::EngineTorquePercent, 0.0).iter().map(|t| 0.01 * t).collect(),
+            },
             torque: get(C::EngineTorquePercent, 0.0),
             engine_brake: get(C::EngineBrakeFrac, 0.0),
             xbr: get(C::XbrDecelMS2, 0.0),

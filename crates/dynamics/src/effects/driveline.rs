@@ -48,9 +48,27 @@ pub struct DrivelineParameters {
     /// Lag of the retarder, s.
     #[serde(default = "retarder_lag_s")]
     pub retarder_lag_s: f64,
-    /// Retarder torque at the propeller shaft that acts although nobody asked for it, Nm.
+    /// Retarder torque at the propeller shaft that acts although nobody asked for it while the
+    /// accelerator is released, Nm.
     #[serde(default)]
     pub hidden_retarder_torque_nm: f64,
+    /// Speed from which it acts, m/s.
+    #[serde(default = "hidden_retarder_from_m_s")]
+    pub hidden_retarder_from_m_s: f64,
+}
+
+/// Pedal below which the accelerator counts as released.
+pub const RELEASED_PEDAL_FRAC: f64 = 0.01;
+
+/// Share of a torque that acts from a speed on, over one metre per second.
+#[must_use]
+#[inline]
+pub fn from_speed_frac(speed_m_s: f64, from_m_s: f64) -> f64 {
+    (0.5 + speed_m_s - from_m_s).clamp(0.0, 1.0)
+}
+
+fn hidden_retarder_from_m_s() -> f64 {
+    8.0
 }
 
 fn one() -> f64 {
@@ -91,6 +109,7 @@ impl DrivelineParameters {
         b.within("retarder_power_w", self.retarder_power_w, 0.0, 1e6);
         b.within("retarder_lag_s", self.retarder_lag_s, 0.005, 5.0);
         b.within("hidden_retarder_torque_nm", self.hidden_retarder_torque_nm, 0.0, 5_000.0);
+        b.within("hidden_retarder_from_m_s", self.hidden_retarder_from_m_s, 1.0, 25.0);
         b.violations
     }
 
@@ -143,10 +162,13 @@ impl DrivelineParameters {
         torque_nm + (target_nm - torque_nm) * (dt_s / self.retarder_lag_s).min(1.0)
     }
 
-    /// Torque of the hidden retarder at a speed, Nm; it fades out at walking pace.
+    /// Torque of the hidden retarder at a speed and a pedal, Nm.
     #[must_use]
-    pub fn hidden_retarder_nm(&self, speed_m_s: f64) -> f64 {
-        self.hidden_retarder_torque_nm * (speed_m_s / 5.0).clamp(0.0, 1.0)
+    pub fn hidden_retarder_nm(&self, speed_m_s: f64, accelerator_pedal_frac: f64) -> f64 {
+        if accelerator_pedal_frac >= RELEASED_PEDAL_FRAC {
+            return 0.0;
+        }
+        self.hidden_retarder_torque_nm * from_speed_frac(speed_m_s, self.hidden_retarder_from_m_s)
     }
 
     /// Wheel force of a torque at the propeller shaft, N.

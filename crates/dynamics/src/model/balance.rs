@@ -73,7 +73,8 @@ impl TruckModel {
             }
         }
         let drive_limit = grip * self.brake_share[1] * self.mass_kg * GRAVITY_M_S2;
-        let retarder_n = d.shaft_force_n(s.retarder_nm + d.hidden_retarder_nm(v)).min(drive_limit);
+        let hidden_nm = d.hidden_retarder_nm(v, command.accelerator_pedal_frac);
+        let retarder_n = d.shaft_force_n(s.retarder_nm + hidden_nm).min(drive_limit);
         let drive_n = wheel.drive_n.clamp(-drive_limit, drive_limit);
         axle_n[1] += 0.5 * (drive_n - retarder_n);
         axle_n[2] += 0.5 * (drive_n - retarder_n);
