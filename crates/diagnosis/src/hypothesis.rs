@@ -229,7 +229,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         M,
         &[P::RetarderCoast],
         &[P::RetarderFrom],
-        &[[0.0, 0.0], [-4.0, 0.0]],
+        &[[-4.0, 0.0], [-2.0, 0.0], [0.0, 0.0], [2.0, 0.0]],
         &[
             C::EngineTorquePercent,
             C::EngineSpeedRpm,

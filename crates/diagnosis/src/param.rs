@@ -151,7 +151,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::RetarderStage, "torque_per_stage_nm", "Nm", (800.0, -300.0, 5000.0, 100.0), 0.0, 0.0),
     s(P::RetarderBrake, "force_n_per_m_s2", "N s2/m", (4000.0, -2e3, 4e4, 400.0), 0.0, 0.0),
     s(P::RetarderCoast, "torque_nm", "Nm", (800.0, -300.0, 5000.0, 100.0), 0.0, 0.0),
-    s(P::RetarderFrom, "start_offset_m_s", "m/s", (3.0, -7.0, 7.0, 0.5), 0.0, 0.0),
+    s(P::RetarderFrom, "start_offset_m_s", "m/s", (3.0, -7.0, 7.0, 0.25), 0.0, 0.0),
     s(P::SpeedScale, "scale", "1", (0.02, -0.2, 0.2, 0.005), 0.001, 0.0),
     s(P::YawBias, "bias_rad_s", "rad/s", (0.004, -0.05, 0.05, 0.001), 3e-4, 0.0),
     s(P::SteerRatio, "ratio_scale", "1", (0.08, -0.4, 0.6, 0.02), 0.004, 0.0),

@@ -21,10 +21,13 @@ const MIN_FIRST: f64 = 6.0;
 /// Least evidence for another cause, and for a first one that has a rival, nats.
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
 /// Part of the evidence already found in the same modules that another cause must add.
-pub(crate) const RELATIVE_EVIDENCE: f64 = 0.002;
+pub(crate) const RELATIVE_EVIDENCE: f64 = 0.003;
 /// Part of the improvement that a step promises by which it may miss before the sensitivities are
 /// taken anew.
 const KEPT_PROMISE: f64 = 0.1;
+/// Secant steps by which a threshold or a time constant may move at once: few samples lie about a
+/// threshold, and far from it a fit gets stuck.
+const SHAPE_STEPS: f64 = 4.0;
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
 /// Pairs refitted.
@@ -68,6 +71,7 @@ impl Problem<'_> {
         let zero = self.reference.theta;
         let free: Vec<P> =
             set.iter().flat_map(|h| CATALOGUE[*h].params()).filter(|p| !p.is_switch()).collect();
+        let shapes: Vec<P> = set.iter().flat_map(|h| CATALOGUE[*h].shapes).copied().collect();
         let sigma = prior(&free);
         let cost = |norm: f64, t: &Theta| {
             norm + free
@@ -90,7 +94,11 @@ impl Problem<'_> {
                 a[(j, j)] += 1.0 / (s * s);
                 b[j] -= (theta[*p as usize] - zero[*p as usize]) / (s * s);
             }
-            let step = a.cholesky()?.solve(&b);
+            let mut step = a.cholesky()?.solve(&b);
+            for (p, d) in free.iter().zip(step.iter_mut()).filter(|(p, _)| shapes.contains(p)) {
+                let most = SHAPE_STEPS * p.spec().step;
+                *d = d.clamp(-most, most);
+            }
             let mut factor = 1.0;
             let mut improved = 0.0;
             for _ in 0..4 {

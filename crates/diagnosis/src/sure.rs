@@ -35,6 +35,10 @@ const ACCOUNTED: f64 = 0.2;
 /// is not sure.
 const MISFIT: f64 = 1.2;
 
+/// Part of the variance that causes take from a module, beyond that of drives in order, below which
+/// what they leave is of their form.
+const FORM: f64 = 0.12;
+
 /// Part of the width between its bounds within which a figure counts as at one.
 const BOUND: f64 = 1e-3;
 
@@ -117,7 +121,7 @@ fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Opti
         };
         return (fit, describe(&rest), sure);
     }
-    if let Some(random) = problem.restless(&fit.theta) {
+    if let Some(random) = problem.restless(&fit.theta).filter(|r| !form(problem, &fit, r.module)) {
         if fit.set.is_empty() || random.evidence > fit.log_z {
             return (empty.clone(), Some(noise(&random)), Sure::Outside);
         }
@@ -170,6 +174,16 @@ fn sharing(fit: &Fit, module: Module) -> usize {
     fit.set.iter().filter(|h| shows(**h, module)).count()
 }
 
+/// What the causes leave in a module that they explain is small against what they explain: the
+/// course of a cause in this truck differs from that of the catalogue.
+fn form(problem: &Problem<'_>, fit: &Fit, module: Module) -> bool {
+    let excess = |theta| {
+        let usual = problem.reference.settled[module as usize].max(1.0);
+        problem.settled(theta)[module as usize] / usual - 1.0
+    };
+    sharing(fit, module) > 0 && excess(&fit.theta) < FORM * excess(&problem.reference.theta)
+}
+
 /// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
 /// module, a module that they explain keeps more variance than drives in order have, or a figure
 /// has run to its bound.
@@ -178,7 +192,7 @@ fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
     let strained = Module::ALL.into_iter().any(|m| {
         let share = sharing(fit, m);
         let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
-        share >= 3 || (share > 0 && excess > MISFIT)
+        share >= 3 || (share > 0 && excess > MISFIT && !form(problem, fit, m))
     });
     let at_bound = |p: &P| {
         let (s, x) = (p.spec(), fit.theta[*p as usize] - problem.reference.theta[*p as usize]);
