@@ -3,9 +3,9 @@
 //! At every step all hypotheses outside the set are screened with the set's parameters free
 //! (secant sensitivities at the fitted point, one Gram matrix), the best are refitted by
 //! Gauss-Newton, and the best refit is taken if it beats the threshold: six nats for the first
-//! cause, ten for a further one, or one percent of what was already explained in the same modules,
-//! whichever is more. The relative rule stops helpers that patch the model-form error of a large
-//! effect.
+//! cause, ten for a further one, or three thousandths of what was already explained in the same
+//! modules, whichever is more. The relative rule stops helpers that patch the model-form error of a
+//! large effect.
 
 use nalgebra::DMatrix;
 
@@ -202,20 +202,29 @@ impl Problem<'_> {
         winner
     }
 
-    /// What `next` must add to `best`.
+    /// What `next` must add to `best`. What is added in modules of which much is explained may patch
+    /// the form of a larger cause; the part that falls on other modules does not.
     fn threshold(&self, best: &Fit, next: &Fit) -> f64 {
         let Some(added) = next.set.iter().find(|h| !best.set.contains(h)) else {
             return f64::INFINITY;
         };
-        let there: f64 = CATALOGUE[*added]
-            .groups()
-            .iter()
-            .flat_map(|g| g.modules())
-            .map(|m| best.explained[*m as usize].max(0.0))
-            .sum();
+        if best.set.is_empty() {
+            return MIN_FIRST;
+        }
+        let groups = CATALOGUE[*added].groups();
+        let (mut there, mut adds, mut adds_apart) = (0.0, 0.0, 0.0);
+        for m in groups.iter().flat_map(|g| g.modules()).map(|m| *m as usize) {
+            let added = (next.explained[m] - best.explained[m]).max(0.0);
+            there += best.explained[m].max(0.0);
+            adds += added;
+            if RELATIVE_EVIDENCE * best.explained[m] < MIN_EVIDENCE {
+                adds_apart += added;
+            }
+        }
         // What the tolerances would have taken anyway was not explained by the set.
-        let there = there.min(best.log_z);
-        if best.set.is_empty() { MIN_FIRST } else { MIN_EVIDENCE.max(RELATIVE_EVIDENCE * there) }
+        let relative = RELATIVE_EVIDENCE * f64::min(there, best.log_z);
+        let apart = MIN_EVIDENCE * adds / f64::max(adds_apart, f64::MIN_POSITIVE);
+        MIN_EVIDENCE.max(relative.min(apart))
     }
 
     fn step(&self, best: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
