@@ -9,11 +9,17 @@ use crate::problem::{Direction, Problem};
 use crate::search::{Fit, directions, prior};
 use crate::stats::evidence;
 
+/// Steps by which a size is moved whose effect is not linear: what a strong wind does is no multiple of
+/// what a breath does.
+const FAR: f64 = 4.0;
+
 /// A hypothesis that was tried for the next place.
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) hypothesis: usize,
     pub(crate) start: Start,
+    /// Its sizes in the linear model.
+    pub(crate) sizes: Vec<f64>,
     /// Gain over the present set, nats, linear.
     pub(crate) gain: f64,
 }
@@ -48,11 +54,8 @@ impl Screen {
     /// first.
     pub(crate) fn singles(&self, without: Option<usize>) -> Vec<Candidate> {
         let (own, base) = self.own(without);
-        let gain = |c: &Trial| {
-            let gain = self.gain(&own, base, &[c])?;
-            Some(Candidate { hypothesis: c.hypothesis, start: c.start, gain })
-        };
-        let mut out: Vec<Candidate> = self.columns.iter().filter_map(gain).collect();
+        let tried = self.columns.iter().filter_map(|c| self.added(&own, base, &[c]));
+        let mut out: Vec<Candidate> = tried.flatten().collect();
         out.sort_by(|x, y| y.gain.total_cmp(&x.gain));
         out
     }
@@ -66,13 +69,8 @@ impl Screen {
                 if CATALOGUE[x.hypothesis].id == CATALOGUE[y.hypothesis].id {
                     continue;
                 }
-                if let Some(gain) = self.gain(&own, base, &[x, y]) {
-                    out.push([x, y].map(|c| Candidate {
-                        hypothesis: c.hypothesis,
-                        start: c.start,
-                        gain,
-                    }));
-                }
+                let added = self.added(&own, base, &[x, y]);
+                out.extend(added.and_then(|pair| <[Candidate; 2]>::try_from(pair).ok()));
             }
         }
         out.sort_by(|x, y| y[0].gain.total_cmp(&x[0].gain));
@@ -101,20 +99,20 @@ impl Screen {
         (own, base)
     }
 
-    /// What the trials add in the linear model; `None` where a sign is wrong.
-    fn gain(&self, own: &[usize], base: f64, trials: &[&Trial]) -> Option<f64> {
-        let added = trials.iter().flat_map(|t| t.at.iter().copied());
-        let keep: Vec<usize> = own.iter().copied().chain(added).collect();
+    /// What the trials add in the linear model, all with the gain of all; `None` where a sign is
+    /// wrong.
+    fn added(&self, own: &[usize], base: f64, trials: &[&Trial]) -> Option<Vec<Candidate>> {
+        let columns = trials.iter().flat_map(|t| t.at.iter().copied());
+        let keep: Vec<usize> = own.iter().copied().chain(columns).collect();
         let (z, x) = self.linear(&keep)?;
-        let mut at = own.len();
-        for t in trials {
-            let sign = CATALOGUE[t.hypothesis].sign;
-            if sign != 0.0 && x[at] * sign < 0.0 {
-                return None;
-            }
-            at += t.at.len();
-        }
-        Some(z - base)
+        let mut sizes = x.iter().skip(own.len()).copied();
+        let of = |t: &&Trial| {
+            let sizes: Vec<f64> = sizes.by_ref().take(t.at.len()).collect();
+            let wrong = sizes.first().is_some_and(|x| x * CATALOGUE[t.hypothesis].sign < 0.0);
+            let (hypothesis, start, gain) = (t.hypothesis, t.start, z - base);
+            (!wrong).then_some(Candidate { hypothesis, start, sizes, gain })
+        };
+        trials.iter().map(of).collect()
     }
 
     /// Linear evidence of columns, the prior centred at no effect.
@@ -136,7 +134,7 @@ impl Problem<'_> {
                 let mut at = Vec::new();
                 for p in hyp.sizes {
                     at.push(dirs.len());
-                    let step = p.spec().step;
+                    let step = p.spec().step * if hyp.nonlinear() { FAR } else { 1.0 };
                     dirs.push(Direction { p: *p, shape: shape.clone(), step });
                     if hyp.nonlinear() {
                         dirs.push(Direction { p: *p, shape: shape.clone(), step: -step });

@@ -271,9 +271,12 @@ impl Problem<'_> {
             for (p, start) in hyp.shapes.iter().zip(start) {
                 theta[*p as usize] = *start;
             }
-            for p in hyp.sizes {
-                theta[*p as usize] = self.reference.theta[*p as usize]
-                    + 0.5 * p.spec().step * if hyp.sign < 0.0 { -1.0 } else { 1.0 };
+            for (p, linear) in hyp.sizes.iter().zip(&c.sizes) {
+                let s = p.spec();
+                let little = 0.5 * s.step * if hyp.sign < 0.0 { -1.0 } else { 1.0 };
+                // The sign of what is not linear decides where a fit ends.
+                let from = if hyp.nonlinear() { linear.clamp(s.lo, s.hi) } else { little };
+                theta[*p as usize] = self.reference.theta[*p as usize] + from;
             }
             self.fit(&set, &theta, zero_norm)
         });
