@@ -9,7 +9,7 @@ use crate::replay::{Module, Prepared};
 use crate::report_models::Models;
 use crate::search::{Fit, MIN_EVIDENCE};
 use crate::sentence;
-use crate::sure::{Sure, judge};
+use crate::sure::{Sure, beyond, judge};
 use crate::{
     Action, BeforeAfter, Cause, Confusion, Diagnosis, DiagnosisError, Drive, DriveSet, Executor,
     Finding, FindingKind, Gain, NotObservable, Parameter, Plant, Verdict, Wrong,
@@ -139,7 +139,9 @@ pub fn diagnose_with(
         None => (Problem::learn(plant, prepare(&learn), false, executor)?, &[] as &[DriveError]),
     };
     let (open, not_observable) = observable(&problem, options);
-    let fitted = problem.search(&open, options.max_causes, &mut |found| {
+    let bare = beyond(&problem, &problem.reference.theta);
+    let most = bare.first().map_or(0.0, |s| s.log_z);
+    let fitted = problem.search(&open, options.max_causes, most, &mut |found| {
         progress(Progress::Search { found });
     });
     let Some((empty, fit)) = fitted else {
@@ -147,7 +149,7 @@ pub fn diagnose_with(
     };
     let fit = problem.gate(fit, &empty);
     progress(Progress::Unknown);
-    let (fit, shape, sure) = judge(&problem, &empty, fit);
+    let (fit, shape, sure) = judge(&problem, &empty, fit, &bare);
     let mut causes = causes(&problem, &fit, &empty, &open);
     let weak = |c: &(Cause, bool)| c.1 && c.0.evidence < MIN_EVIDENCE;
     let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);

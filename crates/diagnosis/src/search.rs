@@ -30,6 +30,8 @@ const KEPT_PROMISE: f64 = 0.1;
 const SHAPE_STEPS: f64 = 4.0;
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
+/// Evidence of a free function over that of causes above which these are searched no further.
+const HOPELESS: f64 = 2.0;
 /// Pairs refitted.
 const PAIRS: usize = 3;
 
@@ -94,7 +96,7 @@ impl Problem<'_> {
                 a[(j, j)] += 1.0 / (s * s);
                 b[j] -= (theta[*p as usize] - zero[*p as usize]) / (s * s);
             }
-            let mut step = a.cholesky()?.solve(&b);
+            let mut step = a.clone().cholesky()?.solve(&b);
             for (p, d) in free.iter().zip(step.iter_mut()).filter(|(p, _)| shapes.contains(p)) {
                 let most = SHAPE_STEPS * p.spec().step;
                 *d = d.clamp(-most, most);
@@ -112,7 +114,8 @@ impl Problem<'_> {
                 if c < best {
                     improved = best - c;
                     (theta, best) = (t, c);
-                    let promised = factor * (2.0 - factor) * b.dot(&step);
+                    let promised =
+                        2.0 * factor * b.dot(&step) - factor * factor * (&a * &step).dot(&step);
                     if (improved - promised).abs() > KEPT_PROMISE * promised {
                         (from, along) = (theta, directions(&free, &theta));
                     }
@@ -140,11 +143,13 @@ impl Problem<'_> {
         Some(Fit { set: set.to_vec(), theta, log_z, free, covariance, gram, norm, explained })
     }
 
-    /// The best set of causes from the catalogue without `excluded` and what cannot be observed.
+    /// The best set of causes among `open`. `bare` is the evidence of the best free function: where
+    /// it stays far above that of two causes, others only patch what the catalogue does not have.
     pub(crate) fn search(
         &self,
         open: &[usize],
         max_causes: usize,
+        bare: f64,
         progress: &mut dyn FnMut(usize),
     ) -> Option<(Fit, Fit)> {
         let zero = self.reference.theta;
@@ -159,9 +164,14 @@ impl Problem<'_> {
                 break;
             }
             best = next;
+            if best.set.len() > 1 && bare > HOPELESS * best.log_z {
+                return Some((empty, best));
+            }
             best = self.drop_and_swap(best, open, zero_norm);
         }
-        if let Some(better) = self.pair_step(&best, &empty, open, zero_norm) {
+        if bare < HOPELESS * best.log_z
+            && let Some(better) = self.pair_step(&best, &empty, open, zero_norm)
+        {
             best = self.drop_and_swap(better, open, zero_norm);
         }
         Some((empty, best))

@@ -4,7 +4,7 @@
 use crate::Unknown;
 use crate::catch_all::Left;
 use crate::hypothesis::CATALOGUE;
-use crate::param::P;
+use crate::param::{P, Theta};
 use crate::problem::Problem;
 use crate::replay::Module;
 use crate::search::Fit;
@@ -68,8 +68,13 @@ pub(crate) enum Sure {
 
 /// Decides between named causes, a free function of a signal and a random disturbance, and whether
 /// causes that stay may stand in for something else.
-pub(crate) fn judge(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, Sure) {
-    let (fit, unknown, sure) = against_functions(problem, empty, fit);
+pub(crate) fn judge(
+    problem: &Problem<'_>,
+    empty: &Fit,
+    fit: Fit,
+    bare: &[Shape],
+) -> (Fit, Option<Unknown>, Sure) {
+    let (fit, unknown, sure) = against_functions(problem, empty, fit, bare);
     if sure != Sure::Yes || fit.set.is_empty() {
         return (fit, unknown, sure);
     }
@@ -85,8 +90,12 @@ pub(crate) fn judge(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Optio
     (fit, unknown, sure)
 }
 
-fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Option<Unknown>, Sure) {
-    let bare = beyond(problem, problem.shapes(&empty.theta));
+fn against_functions(
+    problem: &Problem<'_>,
+    empty: &Fit,
+    fit: Fit,
+    bare: &[Shape],
+) -> (Fit, Option<Unknown>, Sure) {
     let best_bare = bare.first().map_or(0.0, |s| s.log_z);
     if let Some(random) = problem.restless(&empty.theta)
         && random.evidence > best_bare.max(1.15 * fit.log_z)
@@ -94,8 +103,7 @@ fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Opti
     {
         return (empty.clone(), Some(noise(&random)), Sure::Outside);
     }
-    let rest =
-        if fit.set.is_empty() { bare.clone() } else { beyond(problem, problem.shapes(&fit.theta)) };
+    let rest = if fit.set.is_empty() { bare.to_vec() } else { beyond(problem, &fit.theta) };
     let left = rest.first().map_or(0.0, |s| s.firm);
     if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
         let best_rest = rest.first().map_or(0.0, |s| s.log_z);
@@ -104,7 +112,7 @@ fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Opti
         }
         let accounted = left < UNKNOWN_EVIDENCE && best_rest < ACCOUNTED * best_bare;
         if fit.set.is_empty() || !accounted {
-            return (elsewhere(problem, empty, &fit, &bare), describe(&bare), Sure::Outside);
+            return (elsewhere(problem, empty, &fit, bare), describe(bare), Sure::Outside);
         }
     }
     if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
@@ -112,7 +120,7 @@ fn against_functions(problem: &Problem<'_>, empty: &Fit, fit: Fit) -> (Fit, Opti
         // Causes that leave much and that one free function replaces stand in for it.
         let replaced = if share > 1 { REPLACED_MANY } else { REPLACED_ONE };
         if share > 0 && best_bare > replaced * fit.log_z {
-            return (elsewhere(problem, empty, &fit, &bare), describe(&bare), Sure::Outside);
+            return (elsewhere(problem, empty, &fit, bare), describe(bare), Sure::Outside);
         }
         let sure = match (fit.set.is_empty(), share) {
             (true, _) => Sure::Outside,
@@ -151,8 +159,9 @@ fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fi
     if left.log_z > UNKNOWN_EVIDENCE { left } else { empty.clone() }
 }
 
-/// Free functions beyond those that drives in order have too, best first.
-fn beyond(problem: &Problem<'_>, mut shapes: Vec<Shape>) -> Vec<Shape> {
+/// Free functions of what is left at `theta`, beyond those that drives in order have too, best first.
+pub(crate) fn beyond(problem: &Problem<'_>, theta: &Theta) -> Vec<Shape> {
+    let mut shapes = problem.shapes(theta);
     let drives = problem.drives.len() as f64;
     for s in &mut shapes {
         let usual = problem.reference.free_form[s.module as usize].max(0.0);
