@@ -47,7 +47,9 @@ impl Problem<'_> {
         let t_factor = 1.0 + 1.2 / freedom;
         (0..k)
             .map(|j| {
-                let ratio = seen[j] / expected[j].max(f64::MIN_POSITIVE) * drives;
+                // What the drives say nothing about keeps its prior.
+                let told = expected[j] > 1e-9 * fit.covariance[(j, j)];
+                let ratio = if told { seen[j] / expected[j] * drives } else { drives };
                 let dispersion = (DISPERSION_PRIOR + ratio) / freedom;
                 fit.covariance[(j, j)] * dispersion.max(0.8) * t_factor * t_factor
             })

@@ -217,6 +217,12 @@ impl P {
         &SPECS[self as usize]
     }
 
+    /// A fit moves it no farther than to the nearest of many dips: it is fitted from all of its
+    /// starts.
+    pub(crate) fn is_stuck(self) -> bool {
+        matches!(self, Self::RetarderFrom)
+    }
+
     /// A shape that is either off or on in truth.
     pub(crate) fn is_switch(self) -> bool {
         matches!(self, P::StiffnessFollows | P::StiffnessFollowsMass)

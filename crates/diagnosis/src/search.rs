@@ -266,10 +266,10 @@ impl Problem<'_> {
     }
 
     /// The set with a candidate added, fitted from its start; from all of its starts if its shape is
-    /// a switch, which a fit holds.
+    /// a switch, which a fit holds, or one that gets stuck.
     pub(crate) fn with_added(&self, best: &Fit, c: &Candidate, zero_norm: f64) -> Option<Fit> {
         let hyp = &CATALOGUE[c.hypothesis];
-        let starts = if hyp.shapes.iter().any(|p| p.is_switch()) {
+        let starts = if hyp.shapes.iter().any(|p| p.is_switch() || p.is_stuck()) {
             hyp.starts
         } else {
             core::slice::from_ref(&c.start)

@@ -127,3 +127,35 @@ fn an_unknown_in_the_fuel_leaves_the_causes_of_the_steering_named() {
     assert!((ratio.value - 0.88).abs() < 4.0 * ratio.sigma, "{ratio:?}");
     assert_eq!(d.unknown.unwrap().quantity, "fuel_rate_g_s");
 }
+
+fn named(d: &Diagnosis) -> Vec<&'static str> {
+    let mut ids: Vec<&str> = d.causes.iter().map(|c| c.id).collect();
+    ids.sort_unstable();
+    ids
+}
+
+/// A part of all that free play explains was asked of every further cause of the yaw rates, although
+/// a wrong load shows in the force balance, where free play explains nothing.
+#[test]
+fn a_wrong_load_is_named_beside_much_free_play() {
+    let hidden = [cause("steering_free_play", 0.13), cause("mass", 0.08)];
+    let d = judge(&drives(&hidden, 41)).unwrap();
+    assert_eq!(named(&d), ["mass", "steering_free_play"], "{:?}", d.verdict);
+    let mass = d.causes.iter().find(|c| c.id == "mass").unwrap().parameters["mass_scale"];
+    assert!((mass.value - 1.08).abs() < 4.0 * mass.sigma, "{mass:?}");
+}
+
+/// A fit that started with the wrong signs stayed in still air, where side wind of any sign adds
+/// drag.
+#[test]
+fn a_light_wind_is_fitted_whatever_its_signs() {
+    for (turn, seed) in [(0.1, 51), (0.4, 52), (0.6, 53), (0.9, 54)] {
+        let shape = Shape([turn; 4]);
+        let hidden = [Effect::Cause { id: "wind", size: 2.8, shape }];
+        let d = judge(&drives(&hidden, seed)).unwrap();
+        assert_eq!(named(&d), ["wind"], "{turn} {:?}", d.verdict);
+        let p = &d.causes[0].parameters;
+        let wind = p["wind_to_x_m_s"].value.hypot(p["wind_to_y_m_s"].value);
+        assert!((wind - 2.8).abs() < 1.0, "{turn}: {wind}");
+    }
+}
