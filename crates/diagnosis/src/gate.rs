@@ -1,5 +1,5 @@
 //! Which of the fitted causes are kept: large enough for a word, beyond what the drives disagree
-//! about, and worth something on drives that they were not fitted to.
+//! about, of more than one drive, and worth something on drives that they were not fitted to.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -20,8 +20,21 @@ const OWN_SIZES_PART: f64 = 0.15;
 
 /// Part of the smallest size worth a word below which a cause is dropped.
 const WORTH: f64 = 0.5;
+/// Part of the gain expected of all drives but the best below which a cause is of one drive.
+const SHARED: f64 = 0.5;
 /// Part of the information about a cause in one drive above which no other drive can confirm it.
 const LONELY: f64 = 0.85;
+
+/// Information of every drive about a member's parameters, in their priors.
+fn about(fit: &Fit, member: usize) -> Vec<f64> {
+    let hyp = &CATALOGUE[fit.set[member]];
+    let own: Vec<(usize, f64)> = (0..fit.free.len())
+        .filter(|j| hyp.params().any(|q| q == fit.free[*j]))
+        .map(|j| (j + 1, fit.free[j].spec().prior.powi(2)))
+        .collect();
+    let of = |g: &DMatrix<f64>| own.iter().map(|(j, v)| g[(*j, *j)] * v).sum();
+    fit.gram.per_drive.iter().map(of).collect()
+}
 
 impl Problem<'_> {
     /// Variances of the free parameters, widened by what the drives disagree about.
@@ -117,18 +130,30 @@ impl Problem<'_> {
             let hyp = &CATALOGUE[fit.set[i]];
             let size = hyp.size(&fit.theta, &self.reference.theta).abs();
             let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, i);
-            if small || self.folds(&fit, i) < 3.0 {
-                let (set, theta) = self.without(&fit, i);
-                match self.fit(&set, &theta, empty.norm) {
-                    Some(f) => fit = f,
-                    None => return empty.clone(),
-                }
+            let (set, theta) = self.without(&fit, i);
+            let Some(fewer) = self.fit(&set, &theta, empty.norm) else { return empty.clone() };
+            if small || self.folds(&fit, i) < 3.0 || Self::from_one_drive(&fit, i, &fewer) {
+                fit = fewer;
                 i = 0;
             } else {
                 i += 1;
             }
         }
         fit
+    }
+
+    /// The gain of the `i`-th member is of one drive, although others say as much about it: a day of
+    /// strong wind, not what the drives have in common.
+    fn from_one_drive(fit: &Fit, member: usize, fewer: &Fit) -> bool {
+        let drives = fit.gram.per_drive.iter().zip(&fewer.gram.per_drive);
+        let gains: Vec<f64> = drives.map(|(with, less)| less[(0, 0)] - with[(0, 0)]).collect();
+        let known = about(fit, member);
+        let best = gains.iter().enumerate().max_by(|x, y| x.1.total_cmp(y.1));
+        best.is_some_and(|(top, most)| {
+            let (gain, all) = (gains.iter().sum::<f64>(), known.iter().sum::<f64>());
+            let expected = gain * (1.0 - known[top] / all.max(f64::MIN_POSITIVE));
+            gains.len() > 2 && gain - most < SHARED * expected
+        })
     }
 
     /// A size of the `i`-th member is beyond what the drives disagree about.
@@ -158,11 +183,7 @@ impl Problem<'_> {
         let all: Vec<usize> = (0..own.len()).collect();
         // Drives that say most about the member are dealt to the halves in turn; where one drive
         // alone says it (hot brakes once), no other can confirm it.
-        let about = |g: &DMatrix<f64>| -> f64 {
-            (0..own.len()).filter(|j| own[*j]).map(|j| g[(j + 1, j + 1)] * sigma[j].powi(2)).sum()
-        };
-        let mut order: Vec<(usize, f64)> =
-            fit.gram.per_drive.iter().map(about).enumerate().collect();
+        let mut order: Vec<(usize, f64)> = about(fit, member).into_iter().enumerate().collect();
         order.sort_by(|x, y| y.1.total_cmp(&x.1));
         let total: f64 = order.iter().map(|o| o.1).sum();
         if order.first().is_none_or(|o| o.1 > LONELY * total) {
