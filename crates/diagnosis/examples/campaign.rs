@@ -243,7 +243,7 @@ impl Table {
         }
         if let Some(g) = &d.gain {
             self.gains += 1;
-            self.worse += usize::from(g.log_score_nats < 0.0);
+            self.worse += usize::from(g.is_loss());
             let (b, a) = (g.speed_rmse_m_s.before, g.speed_rmse_m_s.after);
             let acts = truth.iter().any(|id| ON_SPEED.contains(id));
             if let Some(o) = oracle.filter(|o| acts && b > 1.5 * o && hit > 0 && !deleted) {
@@ -284,7 +284,7 @@ impl Table {
         println!("not stated as sure  {}", of(self.unsure));
         println!("confident and wrong {}", of(self.wrong));
         println!("90 % intervals that cover {} of {}", self.covered, self.intervals);
-        println!("worse on held-out drives {} of {}", self.worse, self.gains);
+        println!("extension withheld, worse on held-out drives {} of {}", self.worse, self.gains);
         if let (Some(m), Some(w)) =
             (self.kept.get(self.kept.len() / 2), self.kept.get(self.kept.len() / 10))
         {

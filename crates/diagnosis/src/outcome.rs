@@ -10,8 +10,8 @@ use serde_json::{Value, json};
 
 use crate::report::{Report, report};
 use crate::{
-    Diagnosis, DiagnosisError, DriveSet, Executor, Extension, Options, Plant, Progress, TableTrial,
-    diagnose, extend, try_table,
+    Cause, Diagnosis, DiagnosisError, DriveSet, Executor, Extension, NotObservable, Options, Plant,
+    Progress, TableTrial, diagnose, extend, try_table,
 };
 
 /// What is asked for.
@@ -91,7 +91,10 @@ impl Outcome {
         let base =
             if built_in { request.truck_name.to_owned() } else { format!("{name}.base.toml") };
         let extended = format!("{name}.extended");
-        self.extension = extend(request.truck, &base, &extended, &self.found.causes, origin);
+        self.extension = match &self.found.gain {
+            Some(gain) if gain.is_loss() => withheld(&self.found.causes),
+            _ => extend(request.truck, &base, &extended, &self.found.causes, origin),
+        };
         if let Some(effect) = self.table.as_ref().and_then(|t| t.effect.clone()) {
             let overlay = self.extension.overlay.get_or_insert_with(|| Overlay {
                 schema: 1,
@@ -153,6 +156,14 @@ impl Outcome {
         }
         Ok(json)
     }
+}
+
+/// No extension, because drives that were held out speak against it.
+fn withheld(causes: &[Cause]) -> Extension {
+    let why = "the drives held out are worse with it than without".to_owned();
+    let not =
+        |c: &Cause| NotObservable { id: c.id, why: why.clone(), missing_channels: Vec::new() };
+    Extension { overlay: None, not_carried: causes.iter().map(not).collect() }
 }
 
 /// A truck's name as a file name.

@@ -134,6 +134,21 @@ pub struct Gain {
     pub significant: bool,
 }
 
+impl Gain {
+    /// The drives that were held out speak against the extension: their score falls, or an error
+    /// grows and none shrinks.
+    #[must_use]
+    pub fn is_loss(&self) -> bool {
+        let errors = [self.speed_rmse_m_s, self.yaw_rate_rmse_rad_s, self.fuel_error_frac];
+        let grows = errors.iter().any(|e| e.after > (1.0 + CLEAR) * e.before);
+        let shrinks = errors.iter().any(|e| e.after < (1.0 - CLEAR) * e.before);
+        self.log_score_nats < 0.0 || grows && !shrinks
+    }
+}
+
+/// Part by which an error must change to count.
+const CLEAR: f64 = 0.02;
+
 /// Everything that was concluded.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {

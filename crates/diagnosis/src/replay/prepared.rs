@@ -178,7 +178,7 @@ impl Prepared {
             trailer_yaw: get(C::TrailerYawRateRadS, 0.0),
             accel_y: get(C::AccelYMS2, 0.0),
             fuel: get(C::FuelRateGS, 0.0),
-            coolant: get(C::CoolantTempDegc, 80.0),
+            coolant: smooth::running_mean(&get(C::CoolantTempDegc, 80.0), smooth::COOLANT),
             curvature: get(C::Curvature1M, 0.0),
             grade_by_s: GradeBySection::new(&s_map, &grade),
             full_load,

@@ -8,6 +8,10 @@
 /// the margin around shifts.
 pub(super) const CRANK: usize = 10;
 
+/// Samples on either side for the coolant: a switch between two thresholds tells tenths of the
+/// message's kelvin.
+pub(super) const COOLANT: usize = 100;
+
 /// Samples on either side for the hand wheel.
 const WHEEL: usize = 4;
 
