@@ -21,7 +21,7 @@ const MIN_FIRST: f64 = 6.0;
 /// Least evidence for another cause, and for a first one that has a rival, nats.
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
 /// Part of the evidence already found in the same modules that another cause must add.
-pub(crate) const RELATIVE_EVIDENCE: f64 = 0.003;
+const RELATIVE_EVIDENCE: f64 = 0.003;
 /// Part of the improvement that a step promises by which it may miss before the sensitivities are
 /// taken anew.
 const KEPT_PROMISE: f64 = 0.1;

@@ -180,3 +180,23 @@ pub struct Diagnosis {
     #[serde(skip)]
     pub models: Models,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_score_that_falls_or_an_error_that_only_grows_is_a_loss() {
+        let of = |speed: f64, yaw: f64, log_score_nats: f64| Gain {
+            speed_rmse_m_s: BeforeAfter { before: 1.0, after: speed },
+            yaw_rate_rmse_rad_s: BeforeAfter { before: 1.0, after: yaw },
+            log_score_nats,
+            ..Gain::default()
+        };
+        assert!(!of(0.5, 1.0, 40.0).is_loss());
+        assert!(!of(1.0, 1.0, 40.0).is_loss(), "shifts show in neither");
+        assert!(!of(1.3, 0.6, 40.0).is_loss(), "side wind for the yaw rate costs drag");
+        assert!(of(1.3, 1.0, 40.0).is_loss());
+        assert!(of(0.9, 1.0, -0.1).is_loss());
+    }
+}
