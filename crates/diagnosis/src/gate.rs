@@ -132,7 +132,8 @@ impl Problem<'_> {
             let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, i);
             let (set, theta) = self.without(&fit, i);
             let Some(fewer) = self.fit(&set, &theta, empty.norm) else { return empty.clone() };
-            if small || self.folds(&fit, i) < 3.0 || Self::from_one_drive(&fit, i, &fewer) {
+            let weather = hyp.nonlinear() && Self::from_one_drive(&fit, i, &fewer);
+            if small || weather || self.folds(&fit, i) < 3.0 {
                 fit = fewer;
                 i = 0;
             } else {
@@ -143,7 +144,8 @@ impl Problem<'_> {
     }
 
     /// The gain of the `i`-th member is of one drive, although others say as much about it: a day of
-    /// strong wind, not what the drives have in common.
+    /// strong wind, not what the drives have in common. A tolerance takes what is linear along; where
+    /// an effect is not, one drive far out looks like a cause.
     fn from_one_drive(fit: &Fit, member: usize, fewer: &Fit) -> bool {
         let drives = fit.gram.per_drive.iter().zip(&fewer.gram.per_drive);
         let gains: Vec<f64> = drives.map(|(with, less)| less[(0, 0)] - with[(0, 0)]).collect();

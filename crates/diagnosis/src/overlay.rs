@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use dynamics::{Overlay, OverlayValue, TruckParameters};
 use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 
+use crate::replay::{CRUISE_RPM, LOW_LOAD_FRAC};
 use crate::{Cause, NotObservable};
 
 /// An overlay and what could not go into it.
@@ -31,10 +32,6 @@ const FADE_FROM_DEGC: f64 = 150.0;
 const ALTITUDE_FROM_M: f64 = 1_500.0;
 const AIR_FROM_DEGC: f64 = 30.0;
 const WARMUP_S: f64 = 1_800.0;
-/// Load below which the replay's low-load consumption acts, of full load.
-const LOW_LOAD_FRAC: f64 = 0.3;
-/// Engine speed at which a load is turned into a power, rpm: where highway trucks cruise.
-const CRUISE_RPM: f64 = 1_250.0;
 /// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
 const RETARDER_POWER_W: f64 = 400_000.0;
 

@@ -35,6 +35,7 @@ pub(crate) enum P {
     ShiftTime,
     FuelLow,
     FuelLowLoad,
+    FuelLowOver,
     BrakeGain,
     Fade,
     FadeStart,
@@ -76,7 +77,7 @@ pub(crate) enum P {
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 64;
+pub(crate) const PARAMS: usize = 65;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -144,6 +145,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::ShiftTime, "extra_time_s", "s", (0.4, -0.8, 3.0, 0.1), 0.01, 0.05),
     s(P::FuelLow, "extra_frac", "1", (0.2, -0.6, 2.0, 0.05), 0.0, 0.0),
     s(P::FuelLowLoad, "ln_load", "1", (0.35, -1.0, 1.0, 0.2), 0.0, 0.0),
+    s(P::FuelLowOver, "over", "1", (1.0, 0.0, 2.0, 1.0), 0.0, 0.0),
     s(P::BrakeGain, "gain_scale", "1", (0.2, -0.8, 1.5, 0.05), 0.015, 0.0),
     s(P::Fade, "loss_per_100_k", "1", (0.3, -0.1, 2.0, 0.05), 0.0, 0.0),
     s(P::FadeStart, "start_offset_k", "K", (50.0, -100.0, 200.0, 10.0), 0.0, 0.0),
@@ -203,6 +205,8 @@ impl Spec {
                 | P::HeatAirStart
                 | P::HeatCoolantStart
                 | P::FuelLowLoad
+                | P::FuelLowOver
+                | P::RetarderFrom
                 | P::FadeStart
                 | P::StiffnessFollows
                 | P::StiffnessFollowsMass
@@ -223,9 +227,9 @@ impl P {
         matches!(self, Self::RetarderFrom)
     }
 
-    /// A shape that is either off or on in truth.
+    /// A shape that is one of a few in truth.
     pub(crate) fn is_switch(self) -> bool {
-        matches!(self, P::StiffnessFollows | P::StiffnessFollowsMass)
+        matches!(self, P::StiffnessFollows | P::StiffnessFollowsMass | P::FuelLowOver)
     }
 }
 

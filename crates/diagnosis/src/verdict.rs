@@ -147,7 +147,7 @@ impl Gain {
 }
 
 /// Part by which an error must change to count.
-const CLEAR: f64 = 0.02;
+const CLEAR: f64 = 0.05;
 
 /// Everything that was concluded.
 #[derive(Debug, Clone, PartialEq, Serialize)]

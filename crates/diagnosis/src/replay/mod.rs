@@ -17,6 +17,7 @@ mod sensors;
 mod smooth;
 
 pub(crate) use powertrain::noise_g_s as fuel_noise_g_s;
+pub(crate) use powertrain::{CRUISE_RPM, LOW_LOAD_FRAC};
 pub(crate) use prepared::Prepared;
 
 use crate::Plant;
@@ -191,7 +192,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::PedalDelay
         | P::TorqueReport => &[G::Torque],
         P::ShiftTime => &[G::Shift],
-        P::FuelLow | P::FuelLowLoad | P::FuelScale | P::FuelLag => &[G::Fuel],
+        P::FuelLow | P::FuelLowLoad | P::FuelLowOver | P::FuelScale | P::FuelLag => &[G::Fuel],
         P::BrakeDelay => &[G::Brake],
         P::SpeedScale => &[G::Force, G::Lateral, G::Gps, G::Altitude, G::Imu],
         P::YawBias => &[G::Lateral, G::Heading],

@@ -96,6 +96,11 @@ pub(super) fn shift(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     d.shifts.iter().map(|s| s.1 as f64 * Drive::STEP_S - expected).collect()
 }
 
+/// Load below which extra consumption begins, before the fitted factor.
+pub(crate) const LOW_LOAD_FRAC: f64 = 0.3;
+/// Engine speed at which a load is a power, rpm: where highway trucks cruise.
+pub(crate) const CRUISE_RPM: f64 = 1_250.0;
+
 /// Fuel rate, over its noise scale (a constant part and one percent of the rate).
 pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Fuel as usize];
@@ -110,11 +115,21 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let rate = d.profiles.get(Kind::Willans, [lag, 0.0], || {
         (0..d.n).map(|i| plant.engine.fuel_rate_g_s(omega(i), torque(i))).collect()
     });
-    let load = d.profiles.get(Kind::Load, [lag, 0.0], || {
-        (0..d.n).map(|i| torque(i) / plant.engine.full_load_nm.at(omega(i)).max(1.0)).collect()
+    // What is low: torque over the full load at this speed, power, or torque, these two over full
+    // load at cruise.
+    let over = t[P::FuelLowOver as usize];
+    let cruise = CRUISE_RPM / RPM_PER_RAD_S;
+    let load = d.profiles.get(Kind::Load, [lag, over], || {
+        let full_nm = |omega: f64| plant.engine.full_load_nm.at(omega).max(1.0);
+        let of = |i: usize| match over {
+            1.0 => torque(i) / full_nm(cruise) * omega(i) / cruise,
+            2.0 => torque(i) / full_nm(cruise),
+            _ => torque(i) / full_nm(omega(i)),
+        };
+        (0..d.n).map(of).collect()
     });
     let (scale, low) = (1.0 + t[P::FuelScale as usize], t[P::FuelLow as usize]);
-    let per_load = 1.0 / (0.3 * t[P::FuelLowLoad as usize].exp());
+    let per_load = 1.0 / (LOW_LOAD_FRAC * t[P::FuelLowLoad as usize].exp());
     valid
         .iter()
         .enumerate()

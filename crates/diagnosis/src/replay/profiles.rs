@@ -19,7 +19,7 @@ pub(super) enum Kind {
     Grade,
     /// Fuel rate of the map and load; over the lag.
     Willans,
-    /// Torque over full load; over the lag.
+    /// Torque over full load, or what else may be low; over the lag and the choice.
     Load,
     /// Pedal after its dead time.
     Pedal,
