@@ -224,7 +224,7 @@ impl P {
     /// A fit moves it no farther than to the nearest of many dips: it is fitted from all of its
     /// starts.
     pub(crate) fn is_stuck(self) -> bool {
-        matches!(self, Self::RetarderFrom)
+        matches!(self, Self::RetarderFrom | Self::FanStart)
     }
 
     /// A shape that is one of a few in truth.
