@@ -7,13 +7,14 @@
 //! modules, whichever is more. The relative rule stops helpers that patch the model-form error of a
 //! large effect.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, Problem};
 use crate::replay::MODULES;
 use crate::screen::{Candidate, Screen, outside};
+use crate::stats::evidence;
 
 /// Least evidence for a first cause, nats. Drives in order reach it with one of the catalogue's
 /// causes once in some hundred times.
@@ -25,6 +26,8 @@ const RELATIVE_EVIDENCE: f64 = 0.003;
 /// Part of the improvement that a step promises by which it may miss before the sensitivities are
 /// taken anew.
 const KEPT_PROMISE: f64 = 0.1;
+/// Part of what it promises below which a step is compared with one of the newest member alone.
+const BROKEN_PROMISE: f64 = 0.5;
 /// Secant steps by which a threshold or a time constant may move at once: few samples lie about a
 /// threshold, and far from it a fit gets stuck.
 const SHAPE_STEPS: f64 = 4.0;
@@ -67,6 +70,9 @@ pub(crate) fn prior(free: &[P]) -> Vec<f64> {
     free.iter().map(|p| p.spec().prior).collect()
 }
 
+/// Where a step leads, the fall of the cost, and what the linear model promised.
+type Step = (Theta, f64, f64);
+
 impl Problem<'_> {
     /// Fits the parameters of a set by Gauss-Newton with step halving, from `start`.
     pub(crate) fn fit(&self, set: &[usize], start: &Theta, zero_norm: f64) -> Option<Fit> {
@@ -86,7 +92,15 @@ impl Problem<'_> {
         // Where the sensitivities were taken: they serve as long as steps do what they promise.
         let (mut from, mut along) = (theta, directions(&free, &theta));
         let (mut gram, mut chi) = self.gram(&theta, &along);
-        let mut best = cost(gram.sum(|_| true).2, &theta);
+        let last = set.last().map(|h| &CATALOGUE[*h]);
+        let newest: Vec<usize> = match last {
+            Some(h) if set.len() > 1 => {
+                (0..free.len()).filter(|j| h.params().any(|p| p == free[*j])).collect()
+            }
+            _ => Vec::new(),
+        };
+        let began = cost(gram.sum(|_| true).2, &theta);
+        let mut best = began;
         for _ in 0..8 {
             if free.is_empty() {
                 break;
@@ -96,35 +110,45 @@ impl Problem<'_> {
                 a[(j, j)] += 1.0 / (s * s);
                 b[j] -= (theta[*p as usize] - zero[*p as usize]) / (s * s);
             }
-            let mut step = a.clone().cholesky()?.solve(&b);
-            for (p, d) in free.iter().zip(step.iter_mut()).filter(|(p, _)| shapes.contains(p)) {
-                let most = SHAPE_STEPS * p.spec().step;
-                *d = d.clamp(-most, most);
-            }
-            let mut factor = 1.0;
-            let mut improved = 0.0;
-            for _ in 0..4 {
+            let limited = |mut step: DVector<f64>| {
+                for (p, d) in free.iter().zip(step.iter_mut()).filter(|(p, _)| shapes.contains(p)) {
+                    let most = SHAPE_STEPS * p.spec().step;
+                    *d = d.clamp(-most, most);
+                }
+                step
+            };
+            let after = |step: &DVector<f64>, factor: f64| -> Step {
                 let mut t = theta;
                 for (p, d) in free.iter().zip(step.iter()) {
-                    let s = p.spec();
-                    let i = *p as usize;
+                    let (s, i) = (p.spec(), *p as usize);
                     t[i] = (t[i] + factor * d).clamp(zero[i] + s.lo, zero[i] + s.hi);
                 }
                 let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
-                if c < best {
-                    improved = best - c;
-                    (theta, best) = (t, c);
-                    let promised =
-                        2.0 * factor * b.dot(&step) - factor * factor * (&a * &step).dot(&step);
-                    if (improved - promised).abs() > KEPT_PROMISE * promised {
-                        (from, along) = (theta, directions(&free, &theta));
-                    }
-                    (gram, chi) = self.gram_along(&theta, &from, &along);
-                    break;
+                let curve = (&a * step).dot(step);
+                (t, best - c, 2.0 * factor * b.dot(step) - factor * factor * curve)
+            };
+            let step = limited(a.clone().cholesky()?.solve(&b));
+            let tried = [1.0, 0.35, 0.12, 0.043].iter().map(|f| after(&step, *f));
+            let mut found: Option<Step> = tried.into_iter().find(|s| s.1 > 0.0);
+            let promised = b.dot(&step);
+            if found.is_none_or(|s| s.1 < BROKEN_PROMISE * promised) && !newest.is_empty() {
+                // The others stand at a kink of theirs, where no common step helps.
+                let (a, b) = (evidence::sub(&a, &newest), evidence::pick(&b, &newest));
+                let own = a.cholesky()?.solve(&b);
+                let mut alone = DVector::zeros(free.len());
+                newest.iter().zip(own.iter()).for_each(|(j, d)| alone[*j] = *d);
+                let alone = after(&limited(alone), 1.0);
+                if alone.1 > found.map_or(0.0, |s| s.1) {
+                    found = Some(alone);
                 }
-                factor *= 0.35;
             }
-            if improved < 0.3 + 1e-5 * (zero_norm - best).abs() {
+            let Some((t, improved, promised)) = found else { break };
+            (theta, best) = (t, best - improved);
+            if (improved - promised).abs() > KEPT_PROMISE * promised {
+                (from, along) = (theta, directions(&free, &theta));
+            }
+            (gram, chi) = self.gram_along(&theta, &from, &along);
+            if improved < 0.3 + 1e-5 * (began - best) {
                 break;
             }
         }
