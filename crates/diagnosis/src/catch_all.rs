@@ -8,8 +8,8 @@ use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S};
 
 use crate::Drive;
 use crate::problem::Problem;
+use crate::refit::{Fit, directions, prior};
 use crate::replay::{Module, Prepared};
-use crate::search::{Fit, directions, prior};
 use crate::stats::evidence;
 
 /// Prior deviations: a force, N; a force per mass, m/s²; the speed that forms are scaled with, m/s.

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use crate::gain::{DriveError, HORIZON_S, drive_error, rms};
 use crate::hypothesis::CATALOGUE;
 use crate::problem::{Problem, Reference};
+use crate::refit::Fit;
 use crate::replay::{Module, Prepared};
 use crate::report_models::Models;
-use crate::search::{Fit, MIN_EVIDENCE};
+use crate::search::MIN_EVIDENCE;
 use crate::sentence;
 use crate::sure::{Sure, beyond, judge};
 use crate::{

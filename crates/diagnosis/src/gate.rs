@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::hypothesis::CATALOGUE;
 use crate::problem::{Direction, Problem};
-use crate::search::{Fit, prior};
+use crate::refit::{Fit, prior};
 use crate::stats::evidence;
 
 /// Sigmas by which a size must differ from nothing, once the drives' disagreement counts.

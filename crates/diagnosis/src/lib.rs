@@ -28,6 +28,7 @@ mod plant;
 mod plausible;
 mod problem;
 mod read;
+mod refit;
 mod replay;
 pub mod report;
 mod report_models;

@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::hypothesis::{CATALOGUE, Start};
 use crate::param::P;
 use crate::problem::{Direction, Problem};
-use crate::search::{Fit, directions, prior};
+use crate::refit::{Fit, directions, prior};
 use crate::stats::evidence;
 
 /// Steps by which a size is moved whose effect is not linear: what a strong wind does is no multiple of

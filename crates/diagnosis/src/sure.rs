@@ -6,8 +6,8 @@ use crate::catch_all::Left;
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, Theta};
 use crate::problem::Problem;
+use crate::refit::Fit;
 use crate::replay::Module;
-use crate::search::Fit;
 use crate::sentence;
 use crate::unknown::{Restless, Shape};
 
