@@ -100,6 +100,8 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("shift_duration", "extra_time_s") => Carry::Shift,
         ("fuel_map_low_load", "extra_frac") => Plus("engine.fuel.low_load_extra_frac", 1.0),
         ("fuel_map_low_load", "ln_load") => Carry::LowLoad,
+        // The truck file's extra consumption follows power.
+        ("fuel_map_low_load", "over") => Carry::Implied,
         ("brake_gain", "gain_scale") => Times("brake.gain_scale_coeff"),
         ("brake_fade", "loss_per_100_k") => Plus("brake.fade_1_k", 0.01),
         ("brake_fade", "start_offset_k") => {
