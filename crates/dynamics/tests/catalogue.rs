@@ -24,8 +24,8 @@ fn extended(cause: &Cause, sizes: &[f64]) -> TruckParameters {
 }
 
 /// A drive over a road whose map is known: a climb at full load high up in the heat, coasting until
-/// it is slow, braking down
-/// the other side until the brakes are hot, then slalom; what the instruments report every 0.5 s.
+/// it is slow, braking down the other side until the brakes are hot, then slalom; what the
+/// instruments report every 0.5 s.
 fn drive(truck: TruckParameters) -> Vec<EgoState> {
     let model = TruckModel::new(truck, PAYLOAD_KG).unwrap();
     let instruments = model.parameters().instruments;

@@ -283,3 +283,19 @@ fn a_fitted_table_in_an_overlay_pushes_by_its_acceleration() {
     let error = base.with_overlay(&toml::from_str(&wrong).unwrap()).unwrap_err().to_string();
     assert!(error.contains("table_effect.accel_m_s2"), "{error}");
 }
+
+/// It acted under power too, in every truck that was extended by a retarder of the released
+/// accelerator.
+#[test]
+fn a_hidden_retarder_acts_only_while_the_accelerator_is_released_and_from_its_speed_on() {
+    let file = TruckParameters::load("reference").unwrap();
+    let file = file.with_parameter("driveline.hidden_retarder_torque_nm", 1_000.0).unwrap();
+    let m = TruckModel::new(file, 20_000.0).unwrap();
+    let force_n = |speed_m_s: f64, command: &Command| {
+        let s = m.initial_state(0.0, 0.0, 0.0, speed_m_s);
+        run(&m, &s, command, &on_grade(0.0), 0.005).forces.retarder_n
+    };
+    assert!(force_n(20.0, &pedal(0.0)) > 1_000.0);
+    assert_eq!(force_n(20.0, &pedal(0.5)), 0.0);
+    assert_eq!(force_n(6.0, &pedal(0.0)), 0.0);
+}

@@ -60,7 +60,8 @@ pub struct DrivelineParameters {
 /// Pedal below which the accelerator counts as released.
 pub const RELEASED_PEDAL_FRAC: f64 = 0.01;
 
-/// Share of a torque that acts from a speed on, over one metre per second.
+/// Share of a torque that acts from a speed on, rising over one metre per second about it (own form:
+/// a controller switches, a fit needs a slope).
 #[must_use]
 #[inline]
 pub fn from_speed_frac(speed_m_s: f64, from_m_s: f64) -> f64 {
