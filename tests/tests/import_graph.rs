@@ -4,17 +4,26 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// For each crate of the workspace the crates of the workspace that it may link.
 fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
-    let plant = vec!["tractrix-core", "road", "dynamics", "planner", "traffic-client", "j1939"];
+    let plant = vec![
+        "tractrix-core",
+        "road",
+        "driver-models",
+        "dynamics",
+        "planner",
+        "traffic-client",
+        "j1939",
+    ];
     BTreeMap::from([
         ("tractrix-core", vec![]),
         ("road", vec!["tractrix-core"]),
         ("dynamics", vec!["tractrix-core", "road"]),
-        ("planner", vec!["tractrix-core", "road"]),
-        ("traffic-client", vec!["tractrix-core", "road"]),
+        ("driver-models", vec![]),
+        ("planner", vec!["tractrix-core", "road", "driver-models"]),
+        ("traffic-client", vec!["tractrix-core", "road", "driver-models"]),
         ("j1939", vec!["tractrix-core"]),
         ("sim", plant.clone()),
         ("diagnosis", vec!["tractrix-core", "road", "dynamics", "j1939"]),
-        ("truck-node", vec!["tractrix-core", "road", "planner", "j1939"]),
+        ("truck-node", vec!["tractrix-core", "road", "driver-models", "planner", "j1939"]),
         ("tractrix-python", [&plant[..], &["sim", "diagnosis"]].concat()),
         ("sim-server", [plant, vec!["sim", "diagnosis"]].concat()),
     ])

@@ -1,9 +1,9 @@
 //! One driver and vehicle, drawn from the class means.
 
+use driver_models::Idm;
 use tractrix_core::{GRAVITY_M_S2, VehicleClass};
 
 use super::config::TrafficConfig;
-use super::idm::Idm;
 use super::lanes::NO_LANE;
 use crate::philox::{Draws, Stream};
 

@@ -7,13 +7,13 @@
 
 use std::sync::Arc;
 
+use driver_models::{Change, Idm, Mobil, ballistic};
+
 use super::boundary::Boundary;
 use super::config::{ClassConfig, TrafficConfig};
 use super::ego::EgoSpans;
 use super::fleet::Fleet;
-use super::idm::{Idm, ballistic};
 use super::lanes::{LaneMap, NO_LANE};
-use super::mobil::{Change, Mobil};
 use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT};
 
 /// Length of a tick, s.

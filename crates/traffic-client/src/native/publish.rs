@@ -5,11 +5,11 @@
 //! `10 p³ - 15 p⁴ + 6 p⁵` of the elapsed fraction p, which starts and ends without lateral speed
 //! or acceleration.
 
+use driver_models::ballistic;
 use road::Road;
 use tractrix_core::{Neighbour, Scene};
 
 use super::engine::Engine;
-use super::idm::ballistic;
 use super::lanes::NO_LANE;
 
 /// Share of a lane change done after the fraction `p` of its duration, and its derivative.

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use driver_models::{Idm, ballistic};
 use tractrix_core::{EgoState, Geometry};
 
 use super::config::{Density, TrafficConfig};
 use super::driver::Driver;
 use super::engine::{Engine, TICK_S};
 use super::fleet::Fleet;
-use super::idm::{Idm, ballistic};
 use super::lanes::{LaneMap, LaneSource, LaneUse, NO_LANE};
 
 fn engine(config: TrafficConfig, map: LaneMap) -> Engine {

@@ -43,6 +43,7 @@ pub struct Change {
 
 impl Mobil {
     /// The safety criterion.
+    #[inline]
     #[must_use]
     pub fn is_safe(&self, c: &Change) -> bool {
         c.new_follower_after_m_s2 >= -self.safe_decel_m_s2
@@ -50,6 +51,7 @@ impl Mobil {
     }
 
     /// The advantage over the threshold, m/s²; a change pays if it is positive.
+    #[inline]
     #[must_use]
     pub fn incentive_m_s2(&self, c: &Change, to_the_right: bool) -> f64 {
         let bias = if to_the_right { self.right_bias_m_s2 } else { -self.right_bias_m_s2 };

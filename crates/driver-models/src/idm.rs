@@ -39,6 +39,7 @@ const TOUCH_M: f64 = 0.01;
 
 impl Idm {
     /// A driver. All arguments positive (checked by the configuration).
+    #[inline]
     #[must_use]
     pub fn new(
         desired_speed_m_s: f64,
@@ -61,6 +62,7 @@ impl Idm {
 
     /// Acceleration on a free road, m/s², with the desired speed capped by `limit_m_s`. A limit of
     /// zero asks for a stop with the comfortable deceleration.
+    #[inline]
     #[must_use]
     pub fn free_m_s2(&self, speed_m_s: f64, limit_m_s: f64) -> f64 {
         let v0 = self.desired_speed_m_s.min(limit_m_s);
@@ -72,16 +74,34 @@ impl Idm {
         (self.accel_m_s2 * (1.0 - r2 * r2)).max(-self.decel_m_s2)
     }
 
-    /// The part of the acceleration that the leader takes away, m/s², zero or negative, unclamped:
-    /// `-a (s*/s)^2`. `closing_m_s` is own speed minus the leader's.
+    /// The gap wanted now, `s*`, m. `closing_m_s` is own speed minus the leader's.
+    #[inline]
     #[must_use]
-    pub fn interaction_m_s2(&self, speed_m_s: f64, gap_m: f64, closing_m_s: f64) -> f64 {
+    pub fn wanted_gap_m(&self, speed_m_s: f64, closing_m_s: f64) -> f64 {
         let dynamic = speed_m_s * (self.headway_s + closing_m_s / self.two_sqrt_ab_m_s2);
-        let r = (self.min_gap_m + dynamic.max(0.0)) / gap_m.max(TOUCH_M);
+        self.min_gap_m + dynamic.max(0.0)
+    }
+
+    /// The part of the acceleration that a leader at `gap_m` takes away from who wants
+    /// `wanted_gap_m`, m/s², zero or negative, unclamped: `-a (s*/s)^2`. For those who want more
+    /// room than [`Idm::wanted_gap_m`], a safe gap for example.
+    #[inline]
+    #[must_use]
+    pub fn hindrance_m_s2(&self, wanted_gap_m: f64, gap_m: f64) -> f64 {
+        let r = wanted_gap_m / gap_m.max(TOUCH_M);
         -self.accel_m_s2 * r * r
     }
 
+    /// The part of the acceleration that the leader takes away, m/s², zero or negative, unclamped.
+    /// `closing_m_s` is own speed minus the leader's.
+    #[inline]
+    #[must_use]
+    pub fn interaction_m_s2(&self, speed_m_s: f64, gap_m: f64, closing_m_s: f64) -> f64 {
+        self.hindrance_m_s2(self.wanted_gap_m(speed_m_s, closing_m_s), gap_m)
+    }
+
     /// Acceleration behind a leader, m/s².
+    #[inline]
     #[must_use]
     pub fn accel_m_s2(&self, speed_m_s: f64, limit_m_s: f64, gap_m: f64, closing_m_s: f64) -> f64 {
         let a = self.free_m_s2(speed_m_s, limit_m_s)
@@ -91,6 +111,7 @@ impl Idm {
 
     /// Gap at which a driver follows a leader of the same steady speed, m (Eq. 11.19 of Treiber &
     /// Kesting): `(s0 + v T) / sqrt(1 - (v/v0)^4)`; infinite at or above v0.
+    #[inline]
     #[must_use]
     pub fn equilibrium_gap_m(&self, speed_m_s: f64) -> f64 {
         let r = speed_m_s / self.desired_speed_m_s;
@@ -100,19 +121,6 @@ impl Idm {
         }
         (self.min_gap_m + speed_m_s * self.headway_s) / libm::sqrt(free)
     }
-}
-
-/// Moves a vehicle by one step of constant acceleration that stops at zero speed: new speed (m/s)
-/// and distance (m). The ballistic update (Treiber & Kanagaraj, Physica A 419 (2015) 183).
-#[must_use]
-pub fn ballistic(speed_m_s: f64, accel_m_s2: f64, dt_s: f64) -> (f64, f64) {
-    let v = speed_m_s + accel_m_s2 * dt_s;
-    if v < 0.0 {
-        let distance =
-            if accel_m_s2 < 0.0 { -0.5 * speed_m_s * speed_m_s / accel_m_s2 } else { 0.0 };
-        return (0.0, distance);
-    }
-    (v, (speed_m_s + 0.5 * accel_m_s2 * dt_s) * dt_s)
 }
 
 #[cfg(test)]
@@ -130,8 +138,8 @@ mod tests {
             for gap in [20.0, 50.0, 120.0] {
                 for dv in [-5.0, 0.0, 3.0] {
                     let s_star: f64 =
-                        2.0 + (v * 1.6 + v * dv / (2.0 * (0.73f64 * 1.67).sqrt())).max(0.0);
-                    let a = 0.73 * (1.0 - (v / 33.3f64).powi(4) - (s_star / gap).powi(2));
+                        2.0 + (v * 1.6 + v * dv / (2.0 * libm::sqrt(0.73 * 1.67))).max(0.0);
+                    let a = 0.73 * (1.0 - libm::pow(v / 33.3, 4.0) - libm::pow(s_star / gap, 2.0));
                     let got = d.accel_m_s2(v, 99.0, gap, dv);
                     assert!((got - a.max(-9.0)).abs() < 1e-12, "{v} {gap} {dv}: {got} {a}");
                 }
@@ -155,14 +163,5 @@ mod tests {
         assert_eq!(d.accel_m_s2(10.0, 0.0, f64::INFINITY, 0.0), -1.67);
         assert_eq!(d.free_m_s2(0.0, 0.0), 0.0);
         assert!(d.accel_m_s2(10.0, 0.0, 0.0, 10.0) >= -9.0);
-    }
-
-    #[test]
-    fn a_braking_vehicle_stops_where_energy_says_and_never_reverses() {
-        let (v, x) = ballistic(1.0, -5.0, 1.0);
-        assert_eq!((v, x), (0.0, 0.1));
-        assert_eq!(ballistic(0.0, -1.0, 0.1), (0.0, 0.0));
-        let (v, x) = ballistic(10.0, 1.0, 2.0);
-        assert_eq!((v, x), (12.0, 22.0));
     }
 }
