@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use dynamics::{TruckModel, TruckParameters};
-use planner::pcc::course::profile_of;
+use planner::pcc::model::profile_of;
 use planner::pcc::{SpeedBand, TripRequest, Tuning, plan_trip};
 use planner::{SpeedPlannerKind, Stack, StackConfig, drive_tick};
 use road::{Cubics, Line, Road, builtin};

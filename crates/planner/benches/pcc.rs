@@ -11,14 +11,9 @@ mod data_sheet;
 mod replan;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use planner::pcc::clarabel_backend::Clarabel;
-use planner::pcc::lin::Subproblem;
-use planner::pcc::solution::Solution;
-use planner::pcc::solver::DefaultSolver;
-use planner::pcc::structured::Structured;
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::trip_result::plan_trip_with;
-use planner::pcc::{SpeedBand, Tuning, clarabel_backend};
+use planner::pcc::solve::{Clarabel, DefaultSolver, Solution, Structured, Subproblem, clarabel};
+use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
+use planner::pcc::{SpeedBand, Tuning};
 use std::hint::black_box;
 
 const ROADS: [&str; 3] = ["rolling2", "hilly5", "test_site"];
@@ -72,8 +67,7 @@ fn replans(c: &mut Criterion) {
     each_trip(|name, request| {
         let trip = Trip::new(request).unwrap();
         let end = *trip.cruise.e_j_kg.last().unwrap();
-        let (driven, plan) =
-            trip.solve(trip.cruise.trip_time_s(), end, &mut clarabel_backend::solve);
+        let (driven, plan) = trip.solve(trip.cruise.trip_time_s(), end, &mut clarabel::solve);
         let windows = replan::windows(&trip, &driven, plan.beta_g_s, 40);
         let mut fast = Structured::default();
         let mut at = 0;

@@ -9,10 +9,8 @@ use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use planner::decider::Policy;
-use planner::gate::Gate;
-use planner::lane_change::{LaneChangeConfig, Start, plan_change};
-use planner::path::LateralPath;
-use planner::rss::RssConfig;
+use planner::safety::{Gate, RssConfig};
+use planner::steering::{LaneChangeConfig, LateralPath, Start, plan_change};
 use planner::{DeciderKind, LaneChoice, Stack, StackConfig};
 use road::{Road, builtin};
 use tractrix_core::{EgoState, Neighbour, PowertrainSignals, Scene, Stamped, Time, VehicleClass};

@@ -12,11 +12,9 @@ mod data_sheet;
 #[path = "../tests/support/pcc/replan.rs"]
 mod replan;
 
-use planner::pcc::clarabel_backend;
-use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
-use planner::pcc::programme::Programme;
-use planner::pcc::solution::Solution;
-use planner::pcc::structured::Structured;
+use planner::pcc::solve::{
+    Programme, Solution, Structured, Subproblem, Terminal, TimeRule, clarabel,
+};
 use planner::pcc::trip::{Trip, TripRequest};
 use planner::pcc::{SpeedBand, Tuning};
 use rustix::time::{ClockId, clock_gettime};
@@ -50,7 +48,7 @@ fn written(name: &str, sub: &Subproblem, end: Terminal, time: TimeRule) -> Value
     let mut own = Solution::default();
     let structured = times_ms(|| Structured::default().solve_into(sub, end, time, &mut own));
     let mut oracle = Solution::default();
-    let clarabel = times_ms(|| oracle = clarabel_backend::solve(sub, end, time, None));
+    let clarabel = times_ms(|| oracle = clarabel::solve(sub, end, time, None));
     let m = Programme::new(sub, end, time, None);
     json!({
         "name": name, "columns": m.columns, "rows": m.b.len(), "equalities": m.equalities,
@@ -80,7 +78,7 @@ fn main() {
         let (driven, plan) =
             trip.solve(trip.cruise.trip_time_s(), end_e, &mut |sub, end, time, _| {
                 last = Some((sub.clone(), end, time));
-                clarabel_backend::solve(sub, end, time, None)
+                clarabel::solve(sub, end, time, None)
             });
         let (sub, end, time) = last.unwrap();
         println!("{}", written(&format!("{name}, 15 km trip"), &sub, end, time));
@@ -88,7 +86,7 @@ fn main() {
         let mut first = None;
         windows[1].replan(&trip, &mut |sub, end, time, _| {
             first.get_or_insert((sub.clone(), end, time));
-            clarabel_backend::solve(sub, end, time, None)
+            clarabel::solve(sub, end, time, None)
         });
         let (sub, end, time) = first.unwrap();
         println!("{}", written(&format!("{name}, 4 km replan"), &sub, end, time));

@@ -13,9 +13,8 @@ mod data_sheet;
 #[path = "../tests/support/pcc/dp.rs"]
 mod dp;
 
-use planner::pcc::solver::DefaultSolver;
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::trip_result::plan_trip;
+use planner::pcc::solve::DefaultSolver;
+use planner::pcc::trip::{Trip, TripRequest, plan_trip};
 use planner::pcc::{SpeedBand, Tuning};
 
 /// Difference to the fuel of a reference that pays nothing at fuel cut-off, %.

@@ -14,14 +14,12 @@ mod data_sheet;
 #[path = "../tests/support/pcc/replan.rs"]
 mod replan;
 
-use planner::pcc::clarabel_backend::Clarabel;
-use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
-use planner::pcc::solution::{Solution, SolveStatus};
-use planner::pcc::solver::DefaultSolver;
-use planner::pcc::structured::Structured;
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::trip_result::plan_trip_with;
-use planner::pcc::{SpeedBand, Tuning, clarabel_backend};
+use planner::pcc::solve::{
+    Clarabel, DefaultSolver, Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule,
+    clarabel,
+};
+use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
+use planner::pcc::{SpeedBand, Tuning};
 use rustix::time::{ClockId, clock_gettime};
 
 fn now_ms() -> f64 {
@@ -96,7 +94,7 @@ fn main() {
                 iterations += found.iterations;
                 if found.status != SolveStatus::Solved {
                     second += 1;
-                    return clarabel_backend::solve(sub, end, time, fence);
+                    return clarabel::solve(sub, end, time, fence);
                 }
                 found
             });
@@ -118,7 +116,7 @@ fn main() {
                     fast.solve_into(sub, end, time, &mut found);
                     if found.status != SolveStatus::Solved {
                         opinions += 1;
-                        return clarabel_backend::solve(sub, end, time, fence);
+                        return clarabel::solve(sub, end, time, fence);
                     }
                     found
                 };

@@ -1,5 +1,16 @@
 //! Deciders, predictive cruise control, lane-change paths, safety gate, controllers, guard.
 //!
+//! [`Stack`] is the planning stack of one truck and [`drive_tick`] one tick of the loop around it.
+//!
+//! | folder | holds |
+//! |---|---|
+//! | `stack` | one tick of the stack: decide, plan, control, guard; its configuration |
+//! | [`decider`] | who wishes for a lane change: rules, MOBIL, a learned policy |
+//! | [`steering`] | lane-change planning and manoeuvres, paths, the lateral controller |
+//! | [`speed`] | reference speed, car following, the longitudinal controller, the load estimator |
+//! | [`safety`] | safe gaps, the gate before a lane change, the guard before the vehicle |
+//! | [`pcc`] | predictive cruise control: the fuel-optimal speed over a trip or a horizon |
+//!
 //! Without default features the crate is `no_std + alloc` and needs no solver. It plans with what a
 //! truck tells about itself ([`tractrix_core::VehicleLimits`]) and never sees the plant's model.
 #![cfg_attr(not(feature = "std"), no_std)]
@@ -7,37 +18,20 @@ extern crate alloc;
 #[cfg(test)]
 extern crate std;
 
-pub mod config;
 pub mod decider;
 mod drive;
 mod error;
-pub mod estimator;
-pub mod following;
-pub mod gate;
-pub mod guard;
-pub mod lane_change;
-pub mod lateral;
-pub mod lateral_model;
-pub mod leads;
-mod limits_check;
-pub mod longitudinal;
-pub mod maneuver;
-pub mod observation;
-pub mod path;
 pub mod pcc;
-pub mod reference_speed;
-pub mod road_load;
-pub mod rss;
-mod speed_profile;
+pub mod safety;
+pub mod speed;
 mod stack;
-pub mod surroundings;
+pub mod steering;
 #[cfg(test)]
 #[path = "../tests/support/data_sheet.rs"]
 mod testing;
 
-pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};
 pub use decider::{DeciderKind, LaneChoice};
 pub use drive::{DriveError, TickOutcome, drive_tick};
 pub use error::PlannerError;
-pub use speed_profile::SpeedProfile;
-pub use stack::Stack;
+pub use speed::SpeedProfile;
+pub use stack::{RatesConfig, SpeedPlannerKind, Stack, StackConfig};

@@ -3,7 +3,7 @@
 
 mod support;
 
-use planner::rss::{RssConfig, SafeGap};
+use planner::safety::{RssConfig, SafeGap};
 use planner::{DeciderKind, LaneChoice, Stack, StackConfig, drive_tick};
 use road::builtin;
 use support::data_sheet::reference_limits;

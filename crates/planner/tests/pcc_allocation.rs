@@ -10,11 +10,10 @@ mod data_sheet;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use planner::pcc::drive::drive_profile;
-use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
-use planner::pcc::solution::{Solution, SolveStatus};
-use planner::pcc::sqp::CutModel;
-use planner::pcc::structured::Structured;
+use planner::pcc::model::drive_profile;
+use planner::pcc::solve::{
+    CutModel, Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule,
+};
 use planner::pcc::trip::{Trip, TripRequest};
 use planner::pcc::{SpeedBand, Tuning};
 

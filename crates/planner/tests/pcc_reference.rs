@@ -13,11 +13,9 @@ mod data_sheet;
 #[path = "support/pcc/dp.rs"]
 mod dp;
 
-use planner::pcc::drive::Driven;
-use planner::pcc::solver::DefaultSolver;
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::trip_result::{TripStatus, plan_trip};
-use planner::pcc::truck::Drive;
+use planner::pcc::model::{Drive, Driven};
+use planner::pcc::solve::DefaultSolver;
+use planner::pcc::trip::{Trip, TripRequest, TripStatus, plan_trip};
 use planner::pcc::{SpeedBand, Tuning};
 use road::ProfilePoint;
 use tractrix_core::{FuelModel, VehicleLimits};

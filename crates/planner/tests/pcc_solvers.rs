@@ -8,10 +8,9 @@ mod corpus;
 #[path = "support/data_sheet.rs"]
 mod data_sheet;
 
-use planner::pcc::clarabel_backend;
-use planner::pcc::lin::{Subproblem, Terminal, TimeRule};
-use planner::pcc::solution::{Solution, SolveStatus};
-use planner::pcc::structured::Structured;
+use planner::pcc::solve::{
+    Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule, clarabel,
+};
 use planner::pcc::trip::{Trip, TripRequest};
 use planner::pcc::{SpeedBand, Tuning};
 
@@ -60,7 +59,7 @@ fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
             let (mut worst, mut seen) = (0.0f64, 0);
             let mut judge = |sub: &Subproblem, end: Terminal, time: TimeRule, _: Option<&[f64]>| {
                 seen += 1;
-                let oracle = clarabel_backend::solve(sub, end, time, None);
+                let oracle = clarabel::solve(sub, end, time, None);
                 if seen > 2 {
                     return oracle;
                 }
@@ -77,7 +76,7 @@ fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
                 ] {
                     // Clarabel's own tolerance, 1e-8 of the cost, is too wide here: the cost is so
                     // flat along some directions that 1e-8 of it are 1e-4 of an energy.
-                    let oracle = clarabel_backend::solve_to(sub, end, time, None, 1e-10);
+                    let oracle = clarabel::solve_to(sub, end, time, None, 1e-10);
                     let mut own = Solution::default();
                     fast.solve_into(sub, end, time, &mut own);
                     if oracle.status != SolveStatus::Solved {
@@ -123,7 +122,7 @@ fn campaign_the_difference_to_clarabel_shrinks_with_clarabels_tolerance() {
         let trip = Trip::new(&request).unwrap();
         let mut seen = 0;
         let mut judge = |sub: &Subproblem, end: Terminal, time: TimeRule, _: Option<&[f64]>| {
-            let oracle = clarabel_backend::solve(sub, end, time, None);
+            let oracle = clarabel::solve(sub, end, time, None);
             seen += 1;
             if seen > 2 {
                 return oracle;
@@ -136,7 +135,7 @@ fn campaign_the_difference_to_clarabel_shrinks_with_clarabels_tolerance() {
             let mut own = Solution::default();
             fast.solve_into(sub, end, time, &mut own);
             for (worst, tolerance) in worst.iter_mut().zip(tolerances) {
-                let other = clarabel_backend::solve_to(sub, end, time, None, tolerance);
+                let other = clarabel::solve_to(sub, end, time, None, tolerance);
                 let gap = own.e_j_kg.iter().zip(&other.e_j_kg);
                 let gap = gap.map(|(a, b)| (a - b).abs() / b).fold(0.0, f64::max);
                 worst.0 = worst.0.max(gap);

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use planner::decider::Policy;
-use planner::observation::{SIZE, spec_hash};
+use planner::decider::observation::{SIZE, spec_hash};
 use planner::{LaneChoice, PlannerError};
 
 const WEIGHTS: &[u8] = include_bytes!("fixtures/policy.safetensors");

@@ -1,7 +1,7 @@
 //! The safe gap in worst-case simulations: sufficient at its full length, and tight.
 #![allow(clippy::unwrap_used)]
 
-use planner::rss::{RearResponse, SafeGap};
+use planner::safety::{RearResponse, SafeGap};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

@@ -4,8 +4,9 @@
 
 mod support;
 
-use planner::pcc::horizon::{HorizonConfig, HorizonFailure, HorizonPlanner, HorizonRequest};
-use planner::pcc::horizon_fence::LeadAhead;
+use planner::pcc::horizon::{
+    HorizonConfig, HorizonFailure, HorizonPlanner, HorizonRequest, LeadAhead,
+};
 use planner::pcc::{SpeedBand, TripRequest, Tuning, plan_trip};
 use planner::{SpeedPlannerKind, Stack, StackConfig, drive_tick};
 use proptest::prelude::*;

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use planner::SpeedPlannerKind;
-use planner::pcc::course::profile_of;
+use planner::pcc::model::profile_of;
 use planner::pcc::{SpeedBand, TripRequest, Tuning, plan_trip};
 use rustix::time::{ClockId, clock_gettime};
 use sim::{Scenario, Status, World};

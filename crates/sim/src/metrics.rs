@@ -2,7 +2,7 @@
 
 use std::collections::{HashSet, VecDeque};
 
-use planner::rss::{RearResponse, RssConfig, SafeGap};
+use planner::safety::{RearResponse, RssConfig, SafeGap};
 use road::Road;
 use serde::Serialize;
 use tractrix_core::{Geometry, Maneuver, Recorder, Tick, Time, VehicleLimits};

@@ -1,6 +1,14 @@
 //! Who wishes lane changes. A decider only wishes; the safety gate decides whether it is driven.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `rules` | the paper's rule with a distance |
+//! | `mobil` | MOBIL over the intelligent driver model |
+//! | `policy` | a learned policy's forward pass |
+//! | [`observation`] | what a learned policy sees |
 
 mod mobil;
+pub mod observation;
 mod policy;
 mod rules;
 
@@ -10,7 +18,7 @@ pub use rules::rules;
 
 use crate::PlannerError;
 use crate::error::config_in;
-use crate::surroundings::{EgoExtent, ahead, behind, in_lane};
+use crate::safety::{EgoExtent, ahead, behind, in_lane};
 use road::{LaneEnd, LaneKind, Road};
 use serde::{Deserialize, Serialize};
 use tractrix_core::{EgoState, Geometry, Neighbour, Scene};

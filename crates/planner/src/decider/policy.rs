@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 
 use super::LaneChoice;
 use crate::PlannerError;
-use crate::observation;
+use crate::decider::observation;
 
 /// Largest accepted layer.
 const WIDTH_MAX: usize = 8192;

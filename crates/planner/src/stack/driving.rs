@@ -5,17 +5,15 @@ use alloc::vec::Vec;
 use super::speed::{Ahead, Doing};
 use super::{Stack, grade, wrapped};
 use crate::SpeedPlannerKind;
-use crate::decider::{DeciderKind, LaneChoice, View, lane_ends, leave_ending_lane, mobil, rules};
-use crate::following::{Following, follow, steady_gap_m};
-use crate::lateral::{PREVIEW_POINTS, PREVIEW_STEP_S, PathError};
-use crate::lateral_model::LOWEST_SPEED_M_S;
-use crate::leads::{LeadView, leads};
-use crate::longitudinal::SpeedTarget;
-use crate::maneuver::{ManeuverPlanner, Situation};
-use crate::observation;
-use crate::path::{Lateral, LateralPath};
-use crate::pcc::horizon_fence::LeadAhead;
-use crate::reference_speed::SpeedBounds;
+use crate::decider::{
+    DeciderKind, LaneChoice, View, lane_ends, leave_ending_lane, mobil, observation, rules,
+};
+use crate::pcc::horizon::LeadAhead;
+use crate::speed::{Following, LeadView, SpeedBounds, SpeedTarget, follow, leads, steady_gap_m};
+use crate::steering::{
+    LOWEST_SPEED_M_S, Lateral, LateralPath, ManeuverPlanner, PREVIEW_POINTS, PREVIEW_STEP_S,
+    PathError, Situation,
+};
 use road::{LaneKind, Road};
 use tractrix_core::{
     Command, EgoState, GearRequest, Maneuver, PlanStatus, Scene, Time, VehicleLimits,

@@ -1,22 +1,29 @@
 //! The planning stack: decide, plan speed, plan path, control, guard.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `mod` | the stack of one truck, a tick with its guard |
+//! | `config` | what a user may set |
+//! | `driving` | the part of a tick with trustworthy inputs |
+//! | `speed` | the predictive speed planner in the stack |
 
+mod config;
 mod driving;
 mod speed;
 
+pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};
+
 use alloc::sync::Arc;
 
+use crate::decider::observation::Observer;
 use crate::decider::{DeciderKind, LaneChoice, Policy};
-use crate::estimator::{LoadEstimate, LoadEstimator};
-use crate::guard::{GuardInput, GuardMemory, Headway, inspect, limit};
-use crate::lateral::LateralController;
-use crate::leads::{LeadView, leads};
-use crate::limits_check::check_limits;
-use crate::longitudinal::LongitudinalController;
-use crate::maneuver::ManeuverPlanner;
-use crate::observation::Observer;
 use crate::pcc::horizon::{HorizonFailure, HorizonPlan};
-use crate::reference_speed::ReferenceSpeed;
-use crate::{PlannerError, SpeedProfile, StackConfig};
+use crate::safety::{GuardInput, GuardMemory, Headway, check_limits, inspect, limit};
+use crate::speed::{
+    LeadView, LoadEstimate, LoadEstimator, LongitudinalController, ReferenceSpeed, leads,
+};
+use crate::steering::{LateralController, ManeuverPlanner};
+use crate::{PlannerError, SpeedProfile};
 use road::Road;
 use speed::SpeedPlanning;
 use tractrix_core::{EgoState, Maneuver, Plan, Scene, Stamped, Time, VehicleLimits};

@@ -7,12 +7,10 @@
 use alloc::vec::Vec;
 
 use crate::StackConfig;
-use crate::pcc::course::Tuning;
 use crate::pcc::horizon::{
-    HorizonFailure, HorizonPlan, HorizonPlanner, HorizonPoint, HorizonRequest,
+    HorizonFailure, HorizonPlan, HorizonPlanner, HorizonPoint, HorizonRequest, LeadAhead,
 };
-use crate::pcc::horizon_fence::LeadAhead;
-use crate::pcc::truck::Drive;
+use crate::pcc::model::{Drive, Tuning};
 use road::{LaneEnd, ProfilePoint, Road};
 use tractrix_core::{EgoState, GearRequest, PlanStatus, Time, VehicleLimits};
 

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use clap::Parser;
 use dynamics::{TruckModel, TruckParameters};
-use planner::pcc::course::profile_of;
-use planner::pcc::solver::DefaultSolver;
+use planner::pcc::model::profile_of;
+use planner::pcc::solve::DefaultSolver;
 use planner::pcc::trip::Trip;
 use planner::pcc::{SpeedBand, TripRequest, TripResult, TripRow, TripTotals, Tuning};
 use road::Road;

@@ -1,6 +1,6 @@
 //! Roads of the corpus: synthetic ones by formula, the built-in ones from the road crate.
 
-use planner::pcc::course::profile_of;
+use planner::pcc::model::profile_of;
 use road::ProfilePoint;
 use tractrix_core::{Curve, FuelModel, Grid, RPM_PER_RAD_S};
 

@@ -1,12 +1,11 @@
 //! Replans of a few kilometres out of a whole trip, for the benches: what a receding horizon asks
 //! of the solver, with gears and first profile from the trip.
 
-use planner::pcc::course::Course;
-use planner::pcc::drive::Driven;
-use planner::pcc::lin::{Terminal, TimeRule};
-use planner::pcc::sqp::{CutModel, Iterations, Problem, Profile, Solver, iterate};
+use planner::pcc::model::{Course, Drive, Driven};
+use planner::pcc::solve::{
+    CutModel, Iterations, Problem, Profile, Solver, Terminal, TimeRule, iterate,
+};
 use planner::pcc::trip::Trip;
-use planner::pcc::truck::Drive;
 
 /// Length of a replan, m.
 pub(crate) const LENGTH_M: f64 = 4_000.0;

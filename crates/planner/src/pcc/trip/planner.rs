@@ -1,0 +1,339 @@
+//! Whole-trip planning: the paper's use (Eq. 18 and 19), against two cruise controls.
+
+use alloc::vec::Vec;
+
+use road::ProfilePoint;
+use tractrix_core::VehicleLimits;
+
+use crate::pcc::error::{PccError, check};
+use crate::pcc::model::{
+    Course, Drive, Driven, MIN_SPEED_M_S, SpeedBand, Truck, Tuning, cruise_energies, cruise_trip,
+    drive_profile,
+};
+use crate::pcc::search::{EngineTables, GearChoice, choose_gears};
+use crate::pcc::solve::{
+    CutModel, Iterations, Problem, Profile, SolveStatus, Solver, Terminal, TimeRule, eco_roll,
+    iterate, refined_gears,
+};
+
+/// A trip to plan.
+#[derive(Debug, Clone)]
+pub struct TripRequest<'a> {
+    /// The road, at least two points.
+    pub profile: &'a [ProfilePoint],
+    /// The truck as it reports itself, mass included.
+    pub truck: &'a VehicleLimits,
+    /// Set speed and band.
+    pub band: SpeedBand,
+    /// Longest duration, s; `None`: that of the set-speed cruise control.
+    pub trip_time_s: Option<f64>,
+    /// Whether coasting phases may open the driveline.
+    pub eco_roll: bool,
+    /// Tuning.
+    pub tuning: Tuning,
+}
+
+/// Successive linearisations with gears from a search: the first over the whole band, the others in
+/// a tube around the best so far.
+const TUBE_ROUNDS: usize = 2;
+
+/// Most subproblems that only tell the price of time, which the gear search is asked again with.
+const PROBES: usize = 2;
+
+/// Gain of a plan over cruise control, relative, below which cruise control is driven.
+const LEAST_GAIN: f64 = 1e-4;
+
+/// Overspeed of the second baseline, m/s.
+const OVERSPEED_M_S: f64 = 5.0 / 3.6;
+
+/// A request checked and sampled, ready to be solved for several trip times.
+#[derive(Debug, Clone)]
+pub struct Trip {
+    /// Longitudinal truck.
+    pub truck: Truck,
+    /// Sampled road.
+    pub course: Course,
+    /// Tuning.
+    pub tuning: Tuning,
+    /// Lowest energy per node, J/kg.
+    pub e_min: Vec<f64>,
+    /// Highest energy per node, J/kg.
+    pub e_max: Vec<f64>,
+    /// Set-speed cruise control.
+    pub cruise: Driven,
+    /// Cruise control with 5 km/h overspeed.
+    pub overspeed: Driven,
+    /// Fastest possible trip, s.
+    pub fastest_s: f64,
+    tables: EngineTables,
+    eco_roll: bool,
+    set_m_s: f64,
+}
+
+impl Trip {
+    /// Checks and samples a request, drives both baselines.
+    ///
+    /// # Errors
+    /// [`PccError`] names the quantity that is not usable, or the place that cannot be driven.
+    pub fn new(request: &TripRequest<'_>) -> Result<Self, PccError> {
+        let truck = Truck::new(request.truck)?;
+        let tuning = request.tuning;
+        let course = Course::new(request.profile, request.truck, &tuning)?;
+        let band = request.band;
+        check("speed_max_m_s", band.max_m_s, MIN_SPEED_M_S, 60.0, "1 to 60 m/s")?;
+        check("set_speed_m_s", band.set_m_s, MIN_SPEED_M_S, band.max_m_s, "1 m/s to the maximum")?;
+        check("speed_min_m_s", band.min_m_s, 0.0, band.set_m_s, "0 to the set speed")?;
+        if let Some(t) = request.trip_time_s {
+            check("trip_time_s", t, 0.1, 1e7, "0.1 to 1e7 s")?;
+        }
+        let approach = tuning.approach_decel_m_s2;
+        let top = truck.top_speed_m_s() * 0.999;
+        let cap = |v: f64| course.ceiling(&truck, v.min(top), approach);
+        let hold = cap(band.set_m_s)?;
+        let over_cap = cap(band.set_m_s + OVERSPEED_M_S)?;
+        let e_max = cap(band.max_m_s)?;
+        let shift = tuning.shift_fuel_g;
+        let start = hold[0];
+        let cruise = cruise_trip(&truck, &course, start, &hold, &hold, shift)?;
+        let overspeed = cruise_trip(&truck, &course, start, &hold, &over_cap, shift)?;
+        let fast = cruise_energies(&truck, &course, start, &e_max, &e_max)?;
+        let gears = choose_gears(&truck, &course, &fast, &GearChoice::follow(shift));
+        let fastest_s = drive_profile(&truck, &course, &fast, &gears, &[], shift).trip_time_s();
+        let lowest = 0.5 * band.min_m_s.max(MIN_SPEED_M_S) * band.min_m_s.max(MIN_SPEED_M_S);
+        let e_min = cruise
+            .e_j_kg
+            .iter()
+            .map(|&e| {
+                let v = (libm::sqrt(2.0 * e) - tuning.relax_m_s).max(0.8 * MIN_SPEED_M_S);
+                lowest.min(0.5 * v * v)
+            })
+            .collect();
+        let tables = EngineTables::new(&truck, e_max.iter().copied().fold(0.0, f64::max));
+        Ok(Self {
+            truck,
+            tables,
+            course,
+            tuning,
+            e_min,
+            e_max,
+            cruise,
+            overspeed,
+            fastest_s,
+            eco_roll: request.eco_roll,
+            set_m_s: band.set_m_s,
+        })
+    }
+
+    /// The planning problem for one trip time and end energy.
+    #[must_use]
+    pub fn problem(&self, trip_time_s: f64, end_e: f64) -> Problem<'_> {
+        Problem {
+            truck: &self.truck,
+            course: &self.course,
+            tuning: &self.tuning,
+            e_min: self.e_min.clone(),
+            e_max: self.e_max.clone(),
+            start_e: self.cruise.e_j_kg[0],
+            terminal: Terminal::Fixed(end_e),
+            time: TimeRule::AtMost(trip_time_s),
+            fence_s: None,
+            start_gear: None,
+            cut: CutModel::Hull,
+            forced_cut: Vec::new(),
+        }
+    }
+
+    /// Price of time at the set speed on the flat, g/s: marginal fuel × drag slope × v³.
+    #[must_use]
+    pub fn beta_guess(&self) -> f64 {
+        let v = self.set_m_s;
+        let g = self.truck.strongest_gear(v);
+        let phi = self.truck.traction_m_s2(g, v);
+        let drive = Drive::Gear(g as u8);
+        let q = (self.truck.fuel_g_s(drive, v, phi) - self.truck.fuel_g_s(drive, v, 0.5 * phi))
+            / (0.5 * phi * v);
+        q * self.truck.drag_1_m * v * v * v
+    }
+
+    /// Solves for one trip time. The plan returned is driven, not promised: energies that the truth
+    /// reaches. The profile's iterations and subproblems are all that it took to find it.
+    pub fn solve(
+        &self,
+        trip_time_s: f64,
+        end_e: f64,
+        solver: &mut Solver<'_>,
+    ) -> (Driven, Profile) {
+        self.solve_near(trip_time_s, end_e, None, solver)
+    }
+
+    /// [`Trip::solve`], told the plan of a similar trip time.
+    pub fn solve_near(
+        &self,
+        trip_time_s: f64,
+        end_e: f64,
+        near: Option<&Profile>,
+        solver: &mut Solver<'_>,
+    ) -> (Driven, Profile) {
+        let (mut iterations, mut subproblems) = (0, 0);
+        let (driven, mut profile) = self.solve_with(trip_time_s, end_e, near, &mut |a, b, c, d| {
+            let found = solver(a, b, c, d);
+            iterations += found.iterations;
+            subproblems += 1;
+            found
+        });
+        (profile.iterations, profile.subproblems) = (iterations, subproblems);
+        (driven, profile)
+    }
+
+    fn solve_with(
+        &self,
+        trip_time_s: f64,
+        end_e: f64,
+        near: Option<&Profile>,
+        solver: &mut Solver<'_>,
+    ) -> (Driven, Profile) {
+        let mut problem = self.problem(trip_time_s, end_e);
+        let cruise = (self.cruise.e_j_kg.as_slice(), self.cruise.drive.as_slice());
+        let mut best: Option<(f64, Driven, Profile)> = None;
+        let probe = Iterations { most: 1, ..Iterations::TRIP };
+        let mut beta = self.beta_guess();
+        let (mut e, mut gears) = match near {
+            Some(plan) => {
+                beta = plan.beta_g_s;
+                (plan.e_j_kg.clone(), plan.gears.clone())
+            }
+            None => problem.first_profile(&self.tables, beta, 1.0, cruise),
+        };
+        for _ in 0..PROBES {
+            let first = iterate(&problem, &e, &gears, beta, probe, solver);
+            let settled = (first.beta_g_s - beta).abs() < 0.1 * beta;
+            beta = first.beta_g_s;
+            if settled {
+                break;
+            }
+            (e, gears) = problem.first_profile(&self.tables, beta, 1.0, cruise);
+        }
+        for round in 0..TUBE_ROUNDS {
+            let profile = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
+            beta = profile.beta_g_s;
+            let refined = refined_gears(&problem, &profile);
+            let centre = profile.e_j_kg.clone();
+            let other = (refined != profile.gears)
+                .then(|| iterate(&problem, &centre, &refined, beta, Iterations::TRIP, solver));
+            self.keep_better(&problem, trip_time_s, profile, &mut best);
+            if let Some(other) = other {
+                self.keep_better(&problem, trip_time_s, other, &mut best);
+            }
+            // Around the best so far the gears are searched anew, at the course's own step.
+            let Some((_, driven, kept)) = best.as_ref().filter(|_| round + 1 < TUBE_ROUNDS) else {
+                break;
+            };
+            let found = problem.tube_profile(&self.tables, kept.beta_g_s, &driven.e_j_kg);
+            let Some(found) = found.filter(|(_, g)| *g != kept.gears) else { break };
+            beta = kept.beta_g_s;
+            (e, gears) = found;
+        }
+        // Part load below zero wheel force: either charged as it is, or cut where it is least.
+        problem.cut = CutModel::Charged;
+        for _ in 0..2 {
+            let Some((_, driven, kept)) = &best else { break };
+            if matches!(problem.cut, CutModel::Hull) {
+                problem.forced_cut = self.light_load(driven);
+            }
+            let (e, gears, beta) = (kept.e_j_kg.clone(), kept.gears.clone(), kept.beta_g_s);
+            let other = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
+            self.keep_better(&problem, trip_time_s, other, &mut best);
+            problem.cut = CutModel::Hull;
+        }
+        problem.forced_cut.clear();
+        let rolling = best.as_ref().filter(|_| self.eco_roll).and_then(|(_, driven, kept)| {
+            eco_roll::opened(&problem, kept, driven, Iterations::TRIP, solver)
+        });
+        if let Some(other) = rolling {
+            self.keep_better(&problem, trip_time_s, other, &mut best);
+        }
+        let Some((_, driven, profile)) = best else {
+            return (self.cruise.clone(), Profile::failed(cruise));
+        };
+        // Cruise control is a plan too: where nothing can be gained (a flat road) it is driven.
+        let mut driven = driven;
+        for other in [&self.cruise, &self.overspeed] {
+            if other.trip_time_s() <= trip_time_s * (1.0 + 1e-9)
+                && other.e_j_kg[other.e_j_kg.len() - 1] >= end_e - 1e-9
+                && other.total_fuel_g() <= driven.total_fuel_g() * (1.0 + LEAST_GAIN)
+                && self.violation(other) < 1e-6
+            {
+                driven = other.clone();
+            }
+        }
+        (driven, profile)
+    }
+
+    /// Intervals that inject less than half of what the engine's own drag takes.
+    fn light_load(&self, driven: &Driven) -> Vec<bool> {
+        (0..self.course.n())
+            .map(|k| match driven.drive[k] {
+                Drive::Gear(g) => {
+                    let v = libm::sqrt(driven.e_j_kg[k] + driven.e_j_kg[k + 1]);
+                    driven.p_m_s2[k] < 0.5 * self.truck.overrun_m_s2(g as usize, v)
+                }
+                Drive::Neutral => false,
+            })
+            .collect()
+    }
+
+    /// Drives a profile and keeps it if it costs less than the best so far: fuel, and the price of
+    /// time for what it is late or lies below the minimum speed, tenfold so that such a plan wins
+    /// only where there is no other.
+    fn keep_better(
+        &self,
+        problem: &Problem<'_>,
+        trip_time_s: f64,
+        profile: Profile,
+        best: &mut Option<(f64, Driven, Profile)>,
+    ) {
+        if !matches!(profile.status, SolveStatus::Solved | SolveStatus::AlmostSolved) {
+            return;
+        }
+        let driven = drive_profile(
+            problem.truck,
+            problem.course,
+            &profile.e_j_kg,
+            &profile.gears,
+            &profile.cut,
+            problem.tuning.shift_fuel_g,
+        );
+        let price = profile.beta_g_s.max(self.beta_guess());
+        let late = (driven.trip_time_s() - trip_time_s * (1.0 + 1e-5)).max(0.0);
+        let slow: f64 = driven
+            .e_j_kg
+            .iter()
+            .zip(&self.e_min)
+            .filter(|(e, low)| **e < **low * (1.0 - 1e-3))
+            .map(|(e, low)| self.course.h_m / libm::sqrt(2.0 * e) * (1.0 - libm::sqrt(e / low)))
+            .sum();
+        let cost = driven.total_fuel_g() + 10.0 * price * (late + slow);
+        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
+            *best = Some((cost, driven, profile));
+        }
+    }
+
+    /// Largest violation of the speed ceiling (m/s), full load or planned brakes (m/s²). The
+    /// minimum speed is a wish, relaxed where the truck cannot hold it.
+    #[must_use]
+    pub fn violation(&self, d: &Driven) -> f64 {
+        let mut worst = 0.0f64;
+        for k in 0..self.course.n() {
+            let v = |e: f64| libm::sqrt(2.0 * e);
+            worst = worst.max(d.v_m_s(k + 1) - v(self.e_max[k + 1]));
+            let mean = v(0.5 * (d.e_j_kg[k] + d.e_j_kg[k + 1]));
+            let top = match d.drive[k] {
+                Drive::Gear(g) => self.truck.traction_m_s2(g as usize, mean),
+                Drive::Neutral => 0.0,
+            };
+            worst = worst.max(d.p_m_s2[k] - top);
+            worst = worst.max(d.brake_m_s2[k] - self.course.brake_m_s2);
+        }
+        worst
+    }
+}

@@ -1,0 +1,244 @@
+//! The safety gate of a lane change: safe gaps on predicted states in both lanes (the paper's
+//! Fig. 14 (b) and (c), with the check that its Algorithm 1 lacks).
+//!
+//! The ego is predicted along its planned change, the others with their present speed; a vehicle
+//! ahead is also taken to go on braking as it does now, one behind to go on accelerating, both for
+//! [`HOLD_S`]. For every instant until the change is done and the reaction time has passed:
+//! - target lane, ahead: `gap >= d_safe(ego, other)` and time to collision above the bound;
+//! - target lane, behind, from the trailer's rear: `gap >= d_safe(other, ego)`, same bound;
+//! - own lane, ahead: `gap >= d_safe(ego, other)` as long as the ego's body reaches into the
+//!   other's.
+
+use super::rss::{RssConfig, SafeGap};
+use super::surroundings::{EgoExtent, in_lane, reaches};
+use crate::steering::LateralPath;
+use alloc::vec::Vec;
+use road::Road;
+use tractrix_core::{EgoState, LaneChangeRefusal, Neighbour, Scene, VehicleLimits};
+
+/// Present acceleration is held for so long, s.
+const HOLD_S: f64 = 1.5;
+/// Step of the prediction, s.
+const STEP_S: f64 = 0.5;
+/// Vehicles alongside within this distance of either bumper occupy the lane, m.
+const ALONGSIDE_M: f64 = 2.0;
+
+/// The ego's planned speed: constant acceleration to the end speed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SpeedCourse {
+    /// Speed now, m/s.
+    pub start_m_s: f64,
+    /// Speed at the end of the change, m/s.
+    pub end_m_s: f64,
+    /// Time from now to the end of the change, s.
+    pub duration_s: f64,
+}
+
+impl SpeedCourse {
+    /// Acceleration, m/s².
+    #[must_use]
+    pub fn accel_m_s2(&self) -> f64 {
+        (self.end_m_s - self.start_m_s) / self.duration_s.max(0.1)
+    }
+
+    /// Speed, m/s, and distance travelled, m, at a time from now in s.
+    #[must_use]
+    pub fn at(&self, time_s: f64) -> (f64, f64) {
+        let a = self.accel_m_s2();
+        let t = time_s.min(self.duration_s);
+        let distance = self.start_m_s * t + 0.5 * a * t * t;
+        (self.start_m_s + a * t, distance + self.end_m_s * (time_s - t))
+    }
+}
+
+/// How strictly the gaps are asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strictness {
+    /// Factor on the safe gaps in the target lane.
+    pub target_factor: f64,
+    /// Factor on the safe gap in the own lane.
+    pub own_factor: f64,
+    /// Least time to collision, s.
+    pub time_to_collision_s: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Role {
+    TargetAhead,
+    TargetBehind,
+    OwnAhead,
+}
+
+/// A neighbour that a change has to do with.
+#[derive(Debug, Clone, Copy)]
+struct Concern {
+    role: Role,
+    neighbour: Neighbour,
+    safe: SafeGap,
+}
+
+impl Concern {
+    /// Speed and distance travelled at a time from now.
+    fn at(&self, time_s: f64) -> (f64, f64) {
+        let a = match self.role {
+            Role::TargetBehind => self.neighbour.accel_m_s2.max(0.0),
+            Role::TargetAhead | Role::OwnAhead => self.neighbour.accel_m_s2.min(0.0),
+        };
+        let v = self.neighbour.speed_m_s.max(0.0);
+        let until_stop = if a < 0.0 { -v / a } else { f64::INFINITY };
+        let t = time_s.min(HOLD_S).min(until_stop);
+        let then = (v + a * t).max(0.0);
+        (then, v * t + 0.5 * a * t * t + then * (time_s - t))
+    }
+}
+
+/// The vehicles that a change from one lane to another has to do with.
+#[derive(Debug, Clone)]
+pub struct Gate {
+    concerns: Vec<Concern>,
+    extent: EgoExtent,
+    reaction_s: f64,
+    occupied: bool,
+}
+
+impl Gate {
+    /// Sorts out the scene for a change from lane `own` to lane `target`.
+    #[must_use]
+    pub fn new(
+        rss: &RssConfig,
+        ego: &EgoState,
+        scene: &Scene,
+        road: &Road,
+        own: u16,
+        target: u16,
+        limits: &VehicleLimits,
+        grade_rad: f64,
+    ) -> Self {
+        let extent = EgoExtent::new(ego, &limits.geometry);
+        let response = rss.ego_response(limits);
+        let mut occupied = false;
+        let mut concerns = Vec::new();
+        for n in &scene.neighbours {
+            let ahead = n.front_s_m > extent.front_s_m;
+            let role = if in_lane(road, target, n, extent.width_m) {
+                occupied |= n.front_s_m > extent.rear_s_m - ALONGSIDE_M
+                    && n.rear_s_m < extent.front_s_m + ALONGSIDE_M;
+                if ahead { Role::TargetAhead } else { Role::TargetBehind }
+            } else if ahead && in_lane(road, own, n, extent.width_m) {
+                Role::OwnAhead
+            } else {
+                continue;
+            };
+            let safe = match role {
+                Role::TargetBehind => {
+                    SafeGap::new(&rss.behind(n.class), rss.ego_brake_max_m_s2, grade_rad)
+                }
+                _ => SafeGap::new(&response, rss.brake_max_m_s2(n.class), grade_rad),
+            };
+            concerns.push(Concern { role, neighbour: *n, safe });
+        }
+        Self {
+            concerns: nearest_of_each_role(concerns),
+            extent,
+            reaction_s: response.reaction_s,
+            occupied,
+        }
+    }
+
+    /// A vehicle is alongside in the target lane.
+    #[must_use]
+    pub fn occupied(&self) -> bool {
+        self.occupied
+    }
+
+    /// Whether the planned change is safe; otherwise the reason.
+    ///
+    /// # Errors
+    /// The first violated condition in time.
+    pub fn check(
+        &self,
+        course: &SpeedCourse,
+        path: &LateralPath,
+        road: &Road,
+        s_m: f64,
+        strictness: &Strictness,
+    ) -> Result<(), LaneChangeRefusal> {
+        if self.occupied {
+            return Err(LaneChangeRefusal::Occupied);
+        }
+        let mut time_s = 0.0;
+        while time_s <= course.duration_s + self.reaction_s {
+            let (v, travelled) = course.at(time_s);
+            let d_m = path.at(road, s_m + travelled).d_m;
+            for c in &self.concerns {
+                self.check_one(c, time_s, v, travelled, d_m, strictness)?;
+            }
+            time_s += STEP_S;
+        }
+        Ok(())
+    }
+
+    fn check_one(
+        &self,
+        c: &Concern,
+        time_s: f64,
+        v: f64,
+        travelled: f64,
+        d_m: f64,
+        strictness: &Strictness,
+    ) -> Result<(), LaneChangeRefusal> {
+        let (v_n, moved) = c.at(time_s);
+        let n = &c.neighbour;
+        let ahead_m = n.rear_s_m + moved - (self.extent.front_s_m + travelled);
+        let behind_m = self.extent.rear_s_m + travelled - (n.front_s_m + moved);
+        let (gap, closing, safe, factor, refusal) = match c.role {
+            Role::TargetAhead => (
+                ahead_m,
+                v - v_n,
+                c.safe.gap_m(v, v_n),
+                strictness.target_factor,
+                LaneChangeRefusal::UnsafeFront,
+            ),
+            Role::TargetBehind => (
+                behind_m,
+                v_n - v,
+                c.safe.gap_m(v_n, v),
+                strictness.target_factor,
+                LaneChangeRefusal::UnsafeRear,
+            ),
+            Role::OwnAhead => {
+                if !reaches(n, d_m, self.extent.width_m) {
+                    return Ok(());
+                }
+                (
+                    ahead_m,
+                    v - v_n,
+                    c.safe.gap_m(v, v_n),
+                    strictness.own_factor,
+                    LaneChangeRefusal::UnsafeOwnLane,
+                )
+            }
+        };
+        let too_close = gap < safe * factor || gap < 2.0;
+        let too_soon = closing > 0.1 && gap < closing * strictness.time_to_collision_s;
+        if too_close || too_soon { Err(refusal) } else { Ok(()) }
+    }
+}
+
+/// The two nearest vehicles of each role: those beyond them cannot come closer without passing.
+fn nearest_of_each_role(mut concerns: Vec<Concern>) -> Vec<Concern> {
+    concerns.sort_by(|a, b| {
+        let near = |c: &Concern| match c.role {
+            Role::TargetBehind => -c.neighbour.front_s_m,
+            Role::TargetAhead | Role::OwnAhead => c.neighbour.rear_s_m,
+        };
+        near(a).total_cmp(&near(b))
+    });
+    let mut seen = [0; 3];
+    concerns.retain(|c| {
+        let count = &mut seen[c.role as usize];
+        *count += 1;
+        *count <= 2
+    });
+    concerns
+}

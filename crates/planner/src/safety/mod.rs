@@ -1,0 +1,23 @@
+//! What keeps the truck from harm whatever was planned.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `limits_check` | a vehicle's limits can be planned with |
+//! | `surroundings` | who is ahead, behind and alongside in a lane |
+//! | `rss` | safe gaps (responsibility-sensitive safety) |
+//! | `gate` | whether a lane change stays outside everyone's safe gap |
+//! | `guard` | the last check: stale input, jumps of the command, minimal risk |
+
+mod gate;
+mod guard;
+mod limits_check;
+mod rss;
+mod surroundings;
+
+pub use gate::Gate;
+pub(crate) use gate::{SpeedCourse, Strictness};
+pub use guard::GuardConfig;
+pub(crate) use guard::{GuardInput, GuardMemory, Headway, inspect, limit};
+pub(crate) use limits_check::check_limits;
+pub use rss::{RearResponse, RssConfig, SafeGap};
+pub(crate) use surroundings::{EgoExtent, ahead, behind, in_lane, reaches};

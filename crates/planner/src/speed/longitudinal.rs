@@ -1,0 +1,288 @@
+//! Speed control: inverse-model feed-forward plus PI, and the choice between pedal, coasting,
+//! retarder and service brake.
+//!
+//! Wanted acceleration `a = a_ref + K (v_ref - v) + I`, limited by what traffic allows; wanted wheel
+//! force `F = m_eff a + resistance(v, grade)`. The pedal delivers every `F` above the engine's drag,
+//! the retarder what is below it, the service brake (XBR) what the retarder cannot. Changing
+//! between driving and braking needs a margin (`band_m_s2`) and a dwell time, except in an
+//! emergency. The integrator rests while an actuator is at its end, while traffic rules and while
+//! the gearbox shifts (anti-windup).
+
+use super::road_load::{InGear, effective_mass_kg, resistance_n};
+use crate::PlannerError;
+use crate::error::config_in;
+use serde::{Deserialize, Serialize};
+use tractrix_core::{BrakeMode, EgoState, VehicleLimits};
+
+/// A rolling truck is this much faster or slower than its reference before it brakes or drives,
+/// m/s. The next plan starts from where it is.
+const COAST_FAST_M_S: f64 = 0.3;
+/// See [`COAST_FAST_M_S`].
+const COAST_SLOW_M_S: f64 = 0.5;
+
+/// Speed-control parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LongitudinalConfig {
+    /// Proportional gain, 1/s.
+    pub gain_1_s: f64,
+    /// Integral time, s.
+    pub integral_time_s: f64,
+    /// Limit of the integral part, m/s².
+    pub integral_limit_m_s2: f64,
+    /// Largest acceleration, m/s².
+    pub accel_max_m_s2: f64,
+    /// Largest deceleration for the reference speed, m/s²; traffic may ask for more.
+    pub decel_max_m_s2: f64,
+    /// Margin for changing between driving and braking, m/s².
+    pub band_m_s2: f64,
+    /// Least time between two such changes, s.
+    pub dwell_s: f64,
+    /// A wanted deceleration from which on margin and dwell do not count, m/s².
+    pub urgent_decel_m_s2: f64,
+    /// Largest rate of the pedal, 1/s.
+    pub pedal_rate_1_s: f64,
+    /// Share of the retarder used before the service brake helps, 0 to 1.
+    pub retarder_use_frac: f64,
+}
+
+impl Default for LongitudinalConfig {
+    fn default() -> Self {
+        Self {
+            gain_1_s: 0.5,
+            integral_time_s: 8.0,
+            integral_limit_m_s2: 0.3,
+            accel_max_m_s2: 0.8,
+            decel_max_m_s2: 1.2,
+            band_m_s2: 0.06,
+            dwell_s: 0.5,
+            urgent_decel_m_s2: 1.0,
+            pedal_rate_1_s: 1.2,
+            retarder_use_frac: 0.95,
+        }
+    }
+}
+
+impl LongitudinalConfig {
+    /// Checks the ranges.
+    ///
+    /// # Errors
+    /// [`PlannerError::Config`] names the key.
+    pub fn check(&self) -> Result<(), PlannerError> {
+        config_in("longitudinal.gain_1_s", self.gain_1_s, 0.0, 5.0)?;
+        config_in("longitudinal.integral_time_s", self.integral_time_s, 0.5, 1e6)?;
+        config_in("longitudinal.integral_limit_m_s2", self.integral_limit_m_s2, 0.0, 2.0)?;
+        config_in("longitudinal.accel_max_m_s2", self.accel_max_m_s2, 0.05, 3.0)?;
+        config_in("longitudinal.decel_max_m_s2", self.decel_max_m_s2, 0.1, 6.0)?;
+        config_in("longitudinal.band_m_s2", self.band_m_s2, 0.0, 0.5)?;
+        config_in("longitudinal.dwell_s", self.dwell_s, 0.0, 10.0)?;
+        config_in("longitudinal.urgent_decel_m_s2", self.urgent_decel_m_s2, 0.1, 5.0)?;
+        config_in("longitudinal.pedal_rate_1_s", self.pedal_rate_1_s, 0.05, 100.0)?;
+        config_in("longitudinal.retarder_use_frac", self.retarder_use_frac, 0.0, 1.0)
+    }
+}
+
+/// What the speed controller is to follow.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SpeedTarget {
+    /// Reference speed, m/s.
+    pub speed_m_s: f64,
+    /// Reference acceleration, m/s².
+    pub accel_m_s2: f64,
+    /// Acceleration not to be exceeded because of traffic, m/s²; infinite without traffic.
+    pub traffic_accel_m_s2: f64,
+    /// Grade at the truck, rad, mean over its length.
+    pub grade_rad: f64,
+    /// The reference is made for rolling on without fuel and brake.
+    pub coast: bool,
+}
+
+/// Pedal, retarder and brake of one control step.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SpeedCommand {
+    /// Accelerator pedal, 0 to 1.
+    pub accelerator_pedal_frac: f64,
+    /// Retarder demand, 0 to 1.
+    pub retarder_frac: f64,
+    /// Service-brake deceleration, m/s².
+    pub xbr_decel_m_s2: f64,
+    /// Brake mode that goes with it.
+    pub brake_mode: BrakeMode,
+    /// The acceleration that is asked for, m/s².
+    pub accel_m_s2: f64,
+    /// Traffic sets it, not the reference.
+    pub traffic_rules: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Actuator {
+    Drive,
+    Brake,
+}
+
+/// The speed controller.
+#[derive(Debug, Clone)]
+pub struct LongitudinalController {
+    config: LongitudinalConfig,
+    integral_m_s2: f64,
+    actuator: Actuator,
+    in_actuator_s: f64,
+    service_brake: bool,
+    pedal_frac: f64,
+    switches: u32,
+    coasting: bool,
+}
+
+impl LongitudinalController {
+    /// A controller at rest.
+    #[must_use]
+    pub fn new(config: LongitudinalConfig) -> Self {
+        Self {
+            config,
+            integral_m_s2: 0.0,
+            actuator: Actuator::Drive,
+            in_actuator_s: 0.0,
+            service_brake: false,
+            pedal_frac: 0.0,
+            switches: 0,
+            coasting: false,
+        }
+    }
+
+    /// Changes between driving and braking so far.
+    #[must_use]
+    pub fn switches(&self) -> u32 {
+        self.switches
+    }
+
+    /// One step of `dt_s`.
+    #[must_use]
+    pub fn step(
+        &mut self,
+        dt_s: f64,
+        ego: &EgoState,
+        target: &SpeedTarget,
+        limits: &VehicleLimits,
+    ) -> SpeedCommand {
+        let c = self.config;
+        let signals = &ego.powertrain;
+        let in_gear = InGear::new(&limits.powertrain, signals.gear, ego.speed_m_s);
+        let error = target.speed_m_s - ego.speed_m_s;
+        let wanted = target.accel_m_s2 + c.gain_1_s * error + self.integral_m_s2;
+        let cruise = wanted.clamp(-c.decel_max_m_s2, c.accel_max_m_s2);
+        let accel = cruise.min(target.traffic_accel_m_s2);
+        let traffic_rules = accel < cruise;
+        self.coasting = target.coast && self.may_coast(error, target, ego.accel_x_m_s2);
+        if self.coasting {
+            return self.roll(dt_s, accel);
+        }
+
+        let mass = effective_mass_kg(limits, &in_gear);
+        let force = mass * accel + resistance_n(&limits.road_load, ego.speed_m_s, target.grade_rad);
+        let coast = in_gear.coast_force_n();
+        self.choose_actuator(dt_s, force - coast, mass, accel);
+
+        let (pedal, retarder_frac, xbr) = match self.actuator {
+            Actuator::Drive => (in_gear.pedal_frac(force), 0.0, 0.0),
+            Actuator::Brake => {
+                let (retarder, xbr) = self.split_brakes(coast - force, &in_gear, mass, accel);
+                (0.0, retarder, xbr)
+            }
+        };
+        let step = c.pedal_rate_1_s * dt_s;
+        self.pedal_frac = match self.actuator {
+            Actuator::Drive => pedal.clamp(self.pedal_frac - step, self.pedal_frac + step),
+            Actuator::Brake => 0.0,
+        };
+
+        let at_end = (force > in_gear.max_force_n() && error > 0.0)
+            || (self.actuator == Actuator::Drive && force < coast && error < 0.0)
+            || wanted != cruise
+            || traffic_rules;
+        if !at_end && !signals.shift_in_progress && signals.gear > 0 {
+            let slope = c.gain_1_s / c.integral_time_s * error;
+            self.integral_m_s2 = (self.integral_m_s2 + slope * dt_s)
+                .clamp(-c.integral_limit_m_s2, c.integral_limit_m_s2);
+        }
+        SpeedCommand {
+            accelerator_pedal_frac: self.pedal_frac,
+            retarder_frac,
+            xbr_decel_m_s2: xbr,
+            brake_mode: if xbr > 0.0 { BrakeMode::Maximum } else { BrakeMode::Off },
+            accel_m_s2: accel,
+            traffic_rules,
+        }
+    }
+
+    /// Whether the truck may roll on: near enough to the reference, a little too fast less than too
+    /// slow, and traffic does not ask for more than rolling gives.
+    fn may_coast(&self, error_m_s: f64, target: &SpeedTarget, accel_m_s2: f64) -> bool {
+        let room = if self.coasting { 1.0 } else { 0.5 };
+        error_m_s > -COAST_FAST_M_S * room
+            && error_m_s < COAST_SLOW_M_S * room
+            && target.traffic_accel_m_s2 > accel_m_s2 - self.config.band_m_s2
+    }
+
+    /// Neither pedal nor brake; the integrator rests.
+    fn roll(&mut self, dt_s: f64, accel_m_s2: f64) -> SpeedCommand {
+        self.in_actuator_s += dt_s;
+        self.actuator = Actuator::Drive;
+        self.service_brake = false;
+        self.pedal_frac = (self.pedal_frac - self.config.pedal_rate_1_s * dt_s).max(0.0);
+        SpeedCommand {
+            accelerator_pedal_frac: self.pedal_frac,
+            accel_m_s2,
+            ..SpeedCommand::default()
+        }
+    }
+
+    /// Driving or braking, with margin and dwell. `surplus_n` is the force above the engine's drag.
+    fn choose_actuator(&mut self, dt_s: f64, surplus_n: f64, mass_kg: f64, accel_m_s2: f64) {
+        let c = &self.config;
+        self.in_actuator_s += dt_s;
+        let margin_n = c.band_m_s2 * mass_kg;
+        let next = if surplus_n < -margin_n {
+            Actuator::Brake
+        } else if surplus_n > margin_n {
+            Actuator::Drive
+        } else {
+            self.actuator
+        };
+        let urgent = accel_m_s2 < -c.urgent_decel_m_s2 && surplus_n < 0.0;
+        if next != self.actuator && (urgent || self.in_actuator_s >= c.dwell_s) {
+            self.actuator = next;
+            self.in_actuator_s = 0.0;
+            self.switches += 1;
+            self.pedal_frac = 0.0;
+            self.service_brake = false;
+        }
+    }
+
+    /// Retarder first, service brake for the rest; the service brake joins and leaves with margin.
+    fn split_brakes(
+        &mut self,
+        brake_n: f64,
+        in_gear: &InGear<'_>,
+        mass_kg: f64,
+        accel_m_s2: f64,
+    ) -> (f64, f64) {
+        let c = &self.config;
+        let available = in_gear.max_retarder_force_n();
+        let usable = c.retarder_use_frac * available;
+        let brake_n = brake_n.max(0.0);
+        let rest_m_s2 = (brake_n - usable).max(0.0) / mass_kg;
+        self.service_brake = if accel_m_s2 < -c.urgent_decel_m_s2 {
+            rest_m_s2 > 0.0
+        } else if self.service_brake {
+            brake_n > 0.8 * usable
+        } else {
+            rest_m_s2 > c.band_m_s2
+        };
+        let share = |force_n: f64| if available > 0.0 { force_n / available } else { 0.0 };
+        if self.service_brake {
+            (share(brake_n.min(usable)), rest_m_s2)
+        } else {
+            (share(brake_n.min(available)), 0.0)
+        }
+    }
+}

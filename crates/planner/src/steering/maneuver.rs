@@ -1,0 +1,189 @@
+//! The manoeuvre state machine: keep lane, change, abort. It starts a change that the gate passes,
+//! checks it again on every call, aborts it while the truck is still inside its lane, and finishes
+//! it otherwise.
+
+use super::lane_change::{
+    LaneChangeConfig, PlannedChange, Start, plan_abort, plan_change, target_lane,
+};
+use super::path::{LateralPath, lane_centre};
+use crate::LaneChoice;
+use crate::safety::{Gate, RssConfig, SpeedCourse};
+use road::Road;
+use tractrix_core::{EgoState, LaneChangeRefusal, Maneuver, Scene, Time, VehicleLimits};
+
+/// What is being driven.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Phase {
+    Keep,
+    Change { own: u16, choice: LaneChoice, course: SpeedCourse, began: Time },
+    Abort { target: u16 },
+}
+
+/// What the state machine looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct Situation<'a> {
+    /// Time.
+    pub now: Time,
+    /// The truck.
+    pub ego: &'a EgoState,
+    /// The others.
+    pub scene: &'a Scene,
+    /// The road.
+    pub road: &'a Road,
+    /// The truck's limits.
+    pub limits: &'a VehicleLimits,
+    /// Reference speed, m/s.
+    pub reference_speed_m_s: f64,
+    /// Steepest descent ahead, rad (uphill positive).
+    pub grade_rad: f64,
+}
+
+/// The manoeuvre and its path.
+#[derive(Debug, Clone)]
+pub struct ManeuverPlanner {
+    config: LaneChangeConfig,
+    rss: RssConfig,
+    phase: Phase,
+    path: LateralPath,
+    quiet_until: Time,
+}
+
+impl ManeuverPlanner {
+    /// Starts on a path, in lane keeping.
+    #[must_use]
+    pub fn new(config: LaneChangeConfig, rss: RssConfig, path: LateralPath) -> Self {
+        Self { config, rss, phase: Phase::Keep, path, quiet_until: Time(i64::MIN) }
+    }
+
+    /// The path.
+    #[must_use]
+    pub fn path(&self) -> &LateralPath {
+        &self.path
+    }
+
+    /// The manoeuvre.
+    #[must_use]
+    pub fn maneuver(&self) -> Maneuver {
+        match self.phase {
+            Phase::Keep => Maneuver::KeepLane,
+            Phase::Change { choice: LaneChoice::Left, .. } => Maneuver::ChangeLeft,
+            Phase::Change { .. } => Maneuver::ChangeRight,
+            Phase::Abort { .. } => Maneuver::AbortChange,
+        }
+    }
+
+    /// The lane that the truck is in, or leaves.
+    #[must_use]
+    pub fn lane(&self) -> u16 {
+        match self.phase {
+            Phase::Change { own, .. } => own,
+            Phase::Keep | Phase::Abort { .. } => self.path.lane,
+        }
+    }
+
+    /// The other lane that the truck's body may reach into.
+    #[must_use]
+    pub fn other_lane(&self) -> Option<u16> {
+        match self.phase {
+            Phase::Keep => None,
+            Phase::Change { .. } => Some(self.path.lane),
+            Phase::Abort { target } => Some(target),
+        }
+    }
+
+    /// Planned speed, m/s, and acceleration, m/s², of a change under way.
+    #[must_use]
+    pub fn planned_speed(&self, now: Time) -> Option<(f64, f64)> {
+        let Phase::Change { course, began, .. } = self.phase else {
+            return None;
+        };
+        let time_s = now.seconds_since(began).max(0.0);
+        let accel = if time_s < course.duration_s { course.accel_m_s2() } else { 0.0 };
+        Some((course.at(time_s).0, accel))
+    }
+
+    /// Looks at a wish; starts the change if it can be driven safely.
+    ///
+    /// # Errors
+    /// Why it is not driven.
+    pub fn request(
+        &mut self,
+        choice: LaneChoice,
+        at: &Situation<'_>,
+    ) -> Result<(), LaneChangeRefusal> {
+        if choice == LaneChoice::Keep {
+            return Ok(());
+        }
+        if self.phase != Phase::Keep || at.now < self.quiet_until {
+            return Err(LaneChangeRefusal::Busy);
+        }
+        let own = self.path.lane;
+        let (s_m, v) = (at.ego.s_m, at.ego.speed_m_s);
+        let target = target_lane(at.road, own, choice, s_m, v, &self.config)?;
+        let gate = self.gate(at, own, target);
+        let PlannedChange { path, course } =
+            plan_change(&self.config, &self.start(at), target, &gate)?;
+        self.path = path;
+        self.phase = Phase::Change { own, choice, course, began: at.now };
+        Ok(())
+    }
+
+    /// Checks a change under way and ends what is complete. Returns the reason of an abort.
+    pub fn update(&mut self, at: &Situation<'_>) -> Option<LaneChangeRefusal> {
+        let done = self.path.offset.is_none_or(|q| at.ego.s_m >= q.end_s_m());
+        if done {
+            if self.phase != Phase::Keep {
+                self.quiet_until = at.now.plus_nanos((self.config.cooldown_s * 1e9) as i64);
+            }
+            self.phase = Phase::Keep;
+            self.path = LateralPath::keep(self.path.lane);
+            return None;
+        }
+        let Phase::Change { own, course, began, .. } = self.phase else {
+            return None;
+        };
+        if !self.inside(own, at) {
+            return None;
+        }
+        let target = self.path.lane;
+        let time_s = at.now.seconds_since(began).max(0.0);
+        let rest = SpeedCourse {
+            start_m_s: at.ego.speed_m_s,
+            end_m_s: course.end_m_s,
+            duration_s: (course.duration_s - time_s).max(0.5),
+        };
+        let gate = self.gate(at, own, target);
+        let verdict = gate.check(&rest, &self.path, at.road, at.ego.s_m, &self.config.under_way());
+        let reason = verdict.err()?;
+        self.path = plan_abort(&self.config, &self.start(at), own);
+        self.phase = Phase::Abort { target };
+        Some(reason)
+    }
+
+    /// Whether the whole body is still inside a lane, and stays so for the next half second.
+    fn inside(&self, lane: u16, at: &Situation<'_>) -> bool {
+        let Some(track) = at.road.lanes().get(usize::from(lane)) else {
+            return false;
+        };
+        let s_m = at.ego.s_m;
+        let soon_m = 0.5 * at.ego.speed_m_s;
+        let room = 0.5 * (track.width_m(s_m) - at.limits.geometry.width_m);
+        let off =
+            |s_m: f64| (self.path.at(at.road, s_m).d_m - lane_centre(at.road, lane, s_m).d_m).abs();
+        off(s_m) < room && off(s_m + soon_m) < room
+    }
+
+    fn gate(&self, at: &Situation<'_>, own: u16, target: u16) -> Gate {
+        Gate::new(&self.rss, at.ego, at.scene, at.road, own, target, at.limits, at.grade_rad)
+    }
+
+    fn start<'a>(&'a self, at: &Situation<'a>) -> Start<'a> {
+        Start {
+            ego: at.ego,
+            path: &self.path,
+            reference_speed_m_s: at.reference_speed_m_s,
+            road: at.road,
+            limits: at.limits,
+        }
+    }
+}
