@@ -91,7 +91,7 @@ fn follower(n: &Neighbour, ahead: Option<(f64, f64)>) -> f64 {
 
 /// The wish of MOBIL.
 #[must_use]
-pub fn mobil(view: &View<'_>, config: &MobilConfig) -> LaneChoice {
+pub(crate) fn mobil(view: &View<'_>, config: &MobilConfig) -> LaneChoice {
     let v = view.ego.speed_m_s;
     let ego = Driver::of(VehicleClass::Truck);
     let length_m = view.extent.front_s_m - view.extent.rear_s_m;

@@ -11,10 +11,13 @@ mod mobil;
 pub mod observation;
 mod policy;
 mod rules;
+#[cfg(test)]
+mod tests;
 
-pub use mobil::{MobilConfig, mobil};
+pub use mobil::MobilConfig;
+pub(crate) use mobil::mobil;
 pub use policy::Policy;
-pub use rules::rules;
+pub(crate) use rules::rules;
 
 use crate::PlannerError;
 use crate::error::config_in;
@@ -75,7 +78,7 @@ impl DeciderKind {
 
 /// What a decider looks at.
 #[derive(Debug, Clone, Copy)]
-pub struct View<'a> {
+pub(crate) struct View<'a> {
     /// The truck.
     pub ego: &'a EgoState,
     /// Its extent.
@@ -93,7 +96,7 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     /// A view from the truck.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         ego: &'a EgoState,
         geometry: &Geometry,
         scene: &'a Scene,
@@ -107,7 +110,7 @@ impl<'a> View<'a> {
 
     /// The through lane on a side, if there is one here.
     #[must_use]
-    pub fn beside(&self, choice: LaneChoice) -> Option<u16> {
+    pub(crate) fn beside(&self, choice: LaneChoice) -> Option<u16> {
         let id = match choice {
             LaneChoice::Left => self.road.left_of(self.lane, self.ego.s_m),
             LaneChoice::Right => self.road.right_of(self.lane, self.ego.s_m),
@@ -119,7 +122,7 @@ impl<'a> View<'a> {
 
     /// The nearest vehicle ahead in a lane and the gap to it, m.
     #[must_use]
-    pub fn ahead(&self, lane: u16) -> Option<(&'a Neighbour, f64)> {
+    pub(crate) fn ahead(&self, lane: u16) -> Option<(&'a Neighbour, f64)> {
         let width = self.extent.width_m;
         let n = ahead(self.scene, &self.extent, |n| in_lane(self.road, lane, n, width))?;
         Some((n, n.rear_s_m - self.extent.front_s_m))
@@ -128,7 +131,7 @@ impl<'a> View<'a> {
     /// The nearest vehicle behind in a lane and the gap from its front to the trailer's rear, m;
     /// negative alongside.
     #[must_use]
-    pub fn behind(&self, lane: u16) -> Option<(&'a Neighbour, f64)> {
+    pub(crate) fn behind(&self, lane: u16) -> Option<(&'a Neighbour, f64)> {
         let width = self.extent.width_m;
         let n = behind(self.scene, &self.extent, |n| in_lane(self.road, lane, n, width))?;
         Some((n, self.extent.rear_s_m - n.front_s_m))
@@ -140,7 +143,7 @@ const LEAVE_WITHIN_M: f64 = 800.0;
 
 /// Whether the truck's lane ends soon.
 #[must_use]
-pub fn lane_ends(view: &View<'_>) -> bool {
+pub(crate) fn lane_ends(view: &View<'_>) -> bool {
     view.road
         .lanes()
         .get(usize::from(view.lane))
@@ -149,7 +152,7 @@ pub fn lane_ends(view: &View<'_>) -> bool {
 
 /// The side on which a through lane goes on, left first.
 #[must_use]
-pub fn leave_ending_lane(view: &View<'_>) -> LaneChoice {
+pub(crate) fn leave_ending_lane(view: &View<'_>) -> LaneChoice {
     [LaneChoice::Left, LaneChoice::Right]
         .into_iter()
         .find(|&choice| view.beside(choice).is_some())

@@ -5,7 +5,7 @@ use super::{LaneChoice, View};
 
 /// The wish of the rule with distance `d`, m, bumper to bumper.
 #[must_use]
-pub fn rules(view: &View<'_>, distance_m: f64) -> LaneChoice {
+pub(crate) fn rules(view: &View<'_>, distance_m: f64) -> LaneChoice {
     let blocked = view.ahead(view.lane).is_some_and(|(_, gap_m)| gap_m < distance_m);
     if !blocked {
         return LaneChoice::Keep;

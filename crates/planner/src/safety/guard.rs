@@ -79,7 +79,7 @@ impl GuardConfig {
 
 /// What the guard remembers between ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct GuardMemory {
+pub(crate) struct GuardMemory {
     /// Last finite ego state.
     last: Option<Stamped<EgoState>>,
     /// When the position last changed.
@@ -93,14 +93,14 @@ pub struct GuardMemory {
 impl GuardMemory {
     /// The last command sent.
     #[must_use]
-    pub fn sent(&self) -> &Command {
+    pub(crate) fn sent(&self) -> &Command {
         &self.sent
     }
 }
 
 /// Verdict on the inputs.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Inspection {
+pub(crate) struct Inspection {
     /// The ego state can be steered with.
     pub ego_usable: bool,
     /// The inputs, or those of a moment ago, call for the minimal-risk manoeuvre.
@@ -111,7 +111,7 @@ pub struct Inspection {
 
 /// Looks at the inputs of a tick. `ego` and `scene_time` are `None` when their seam failed.
 #[must_use]
-pub fn inspect(
+pub(crate) fn inspect(
     config: &GuardConfig,
     memory: &GuardMemory,
     now: Time,
@@ -199,7 +199,7 @@ fn jumped(config: &GuardConfig, last: &Stamped<EgoState>, ego: &Stamped<EgoState
 
 /// The vehicle ahead, for the headway check.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Headway {
+pub(crate) struct Headway {
     /// Gap, m.
     pub gap_m: f64,
     /// Speed of the vehicle ahead, m/s.
@@ -210,7 +210,7 @@ pub struct Headway {
 
 /// What [`limit`] needs besides the plan.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GuardInput {
+pub(crate) struct GuardInput {
     /// Time since the last command, s.
     pub dt_s: f64,
     /// Last trustworthy speed, m/s.
@@ -227,7 +227,7 @@ pub struct GuardInput {
 
 /// The guarded command.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Guarded {
+pub(crate) struct Guarded {
     /// The command to send.
     pub command: Command,
     /// What was changed and why, in order of detection.
@@ -238,7 +238,7 @@ pub struct Guarded {
 
 /// Limits the command of a tick; total: every input gives a safe, finite command.
 #[must_use]
-pub fn limit(
+pub(crate) fn limit(
     config: &GuardConfig,
     memory: &GuardMemory,
     input: &GuardInput,

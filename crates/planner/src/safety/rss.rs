@@ -127,7 +127,7 @@ impl RssConfig {
 
 /// Braking on a grade: gravity helps uphill and hinders downhill. Not below 0.3 m/s².
 #[must_use]
-pub fn brake_on_grade_m_s2(brake_m_s2: f64, grade_rad: f64) -> f64 {
+pub(super) fn brake_on_grade_m_s2(brake_m_s2: f64, grade_rad: f64) -> f64 {
     (brake_m_s2 + GRAVITY_M_S2 * libm::sin(grade_rad)).max(0.3)
 }
 

@@ -11,7 +11,7 @@ const SIDE_MARGIN_M: f64 = 0.3;
 
 /// The ego's extent along the road.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EgoExtent {
+pub(crate) struct EgoExtent {
     /// Front bumper, m.
     pub front_s_m: f64,
     /// Trailer's rear, m.
@@ -23,7 +23,7 @@ pub struct EgoExtent {
 impl EgoExtent {
     /// Of a straight combination at `s_m`.
     #[must_use]
-    pub fn new(ego: &EgoState, geometry: &Geometry) -> Self {
+    pub(crate) fn new(ego: &EgoState, geometry: &Geometry) -> Self {
         Self {
             front_s_m: ego.s_m + geometry.front_m,
             rear_s_m: ego.s_m - geometry.rear_m(),
@@ -34,7 +34,7 @@ impl EgoExtent {
 
 /// Whether a neighbour is in a lane, or on its way into it.
 #[must_use]
-pub fn in_lane(road: &Road, lane: u16, neighbour: &Neighbour, ego_width_m: f64) -> bool {
+pub(crate) fn in_lane(road: &Road, lane: u16, neighbour: &Neighbour, ego_width_m: f64) -> bool {
     if neighbour.lane == lane || neighbour.target_lane == Some(lane) {
         return true;
     }
@@ -47,12 +47,12 @@ pub fn in_lane(road: &Road, lane: u16, neighbour: &Neighbour, ego_width_m: f64) 
 
 /// Whether a neighbour's body reaches into the ego's, were the ego centred at `d_m`.
 #[must_use]
-pub fn reaches(neighbour: &Neighbour, d_m: f64, ego_width_m: f64) -> bool {
+pub(crate) fn reaches(neighbour: &Neighbour, d_m: f64, ego_width_m: f64) -> bool {
     (neighbour.d_m - d_m).abs() < 0.5 * (neighbour.width_m + ego_width_m) + SIDE_MARGIN_M
 }
 
 /// The nearest vehicle ahead among those that `counts` accepts: its front is ahead of the ego's.
-pub fn ahead<'a>(
+pub(crate) fn ahead<'a>(
     scene: &'a Scene,
     ego: &EgoExtent,
     counts: impl Fn(&Neighbour) -> bool,
@@ -66,7 +66,7 @@ pub fn ahead<'a>(
 
 /// The nearest vehicle behind among those that `counts` accepts: its front is behind the ego's
 /// front bumper, so that a vehicle alongside the trailer is found with a negative gap.
-pub fn behind<'a>(
+pub(crate) fn behind<'a>(
     scene: &'a Scene,
     ego: &EgoExtent,
     counts: impl Fn(&Neighbour) -> bool,

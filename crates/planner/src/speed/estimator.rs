@@ -68,7 +68,7 @@ pub struct LoadEstimate {
 
 /// The estimator.
 #[derive(Debug, Clone)]
-pub struct LoadEstimator {
+pub(crate) struct LoadEstimator {
     config: EstimatorConfig,
     declared: RoadLoad,
     theta: [f64; 2],
@@ -80,7 +80,7 @@ pub struct LoadEstimator {
 impl LoadEstimator {
     /// Starts from the declared load with 30 % and 50 % uncertainty.
     #[must_use]
-    pub fn new(config: EstimatorConfig, declared: &RoadLoad) -> Self {
+    pub(crate) fn new(config: EstimatorConfig, declared: &RoadLoad) -> Self {
         let m = declared.mass_kg;
         let roll = m * declared.rolling_coeff;
         let square = |x: f64| x * x;
@@ -94,7 +94,13 @@ impl LoadEstimator {
     }
 
     /// Takes one state, `dt_s` after the last; `grade_rad` is the mean grade under the truck.
-    pub fn update(&mut self, dt_s: f64, ego: &EgoState, grade_rad: f64, limits: &VehicleLimits) {
+    pub(crate) fn update(
+        &mut self,
+        dt_s: f64,
+        ego: &EgoState,
+        grade_rad: f64,
+        limits: &VehicleLimits,
+    ) {
         let signals = &ego.powertrain;
         let quiet = signals.gear > 0
             && !signals.shift_in_progress
@@ -145,7 +151,7 @@ impl LoadEstimator {
 
     /// The present estimate.
     #[must_use]
-    pub fn estimate(&self) -> LoadEstimate {
+    pub(crate) fn estimate(&self) -> LoadEstimate {
         let sigma = libm::sqrt(self.p[0]);
         LoadEstimate {
             mass_kg: self.theta[0],

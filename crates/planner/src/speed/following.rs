@@ -75,7 +75,7 @@ impl FollowingConfig {
 
 /// The vehicle ahead as car following sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Lead {
+pub(crate) struct Lead {
     /// Identifier.
     pub id: u64,
     /// Gap, front bumper to rear bumper, m.
@@ -94,7 +94,7 @@ pub struct Lead {
 
 /// Car following's request.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Following {
+pub(crate) struct Following {
     /// Acceleration not to be exceeded, m/s².
     pub accel_m_s2: f64,
     /// The gap is below the safe gap.
@@ -105,7 +105,7 @@ pub struct Following {
 
 /// Gap that is kept behind `lead` at its speed, m: headway, and the safe gap with its margin.
 #[must_use]
-pub fn steady_gap_m(config: &FollowingConfig, ego: &RearResponse, lead: &Lead) -> f64 {
+pub(crate) fn steady_gap_m(config: &FollowingConfig, ego: &RearResponse, lead: &Lead) -> f64 {
     let v = lead.speed_m_s.max(0.0);
     let safe_m = SafeGap::new(ego, lead.brake_max_m_s2, 0.0).gap_m(v, v);
     wanted_gap_m(config, v * config.headway_s, safe_m)
@@ -117,7 +117,7 @@ fn wanted_gap_m(config: &FollowingConfig, headway_m: f64, safe_m: f64) -> f64 {
 
 /// Largest acceleration that keeps the gap to `lead`, at own `speed_m_s` on `grade_rad`.
 #[must_use]
-pub fn follow(
+pub(crate) fn follow(
     config: &FollowingConfig,
     ego: &RearResponse,
     speed_m_s: f64,

@@ -12,7 +12,7 @@ const ENTERS_S: f64 = 1.0;
 
 /// What leads are looked for with.
 #[derive(Debug, Clone, Copy)]
-pub struct LeadView<'a> {
+pub(crate) struct LeadView<'a> {
     /// The truck.
     pub ego: &'a EgoState,
     /// The others.
@@ -27,7 +27,7 @@ pub struct LeadView<'a> {
 
 /// The lead in the lane that the path ends in, and the one in the lane that is being left.
 #[must_use]
-pub fn leads(view: &LeadView<'_>, maneuver: &ManeuverPlanner) -> [Option<Lead>; 2] {
+pub(crate) fn leads(view: &LeadView<'_>, maneuver: &ManeuverPlanner) -> [Option<Lead>; 2] {
     let extent = EgoExtent::new(view.ego, &view.limits.geometry);
     let width = extent.width_m;
     let kept = maneuver.path().lane;

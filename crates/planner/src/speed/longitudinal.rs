@@ -84,7 +84,7 @@ impl LongitudinalConfig {
 
 /// What the speed controller is to follow.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SpeedTarget {
+pub(crate) struct SpeedTarget {
     /// Reference speed, m/s.
     pub speed_m_s: f64,
     /// Reference acceleration, m/s².
@@ -99,7 +99,7 @@ pub struct SpeedTarget {
 
 /// Pedal, retarder and brake of one control step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct SpeedCommand {
+pub(crate) struct SpeedCommand {
     /// Accelerator pedal, 0 to 1.
     pub accelerator_pedal_frac: f64,
     /// Retarder demand, 0 to 1.
@@ -122,21 +122,20 @@ enum Actuator {
 
 /// The speed controller.
 #[derive(Debug, Clone)]
-pub struct LongitudinalController {
+pub(crate) struct LongitudinalController {
     config: LongitudinalConfig,
     integral_m_s2: f64,
     actuator: Actuator,
     in_actuator_s: f64,
     service_brake: bool,
     pedal_frac: f64,
-    switches: u32,
     coasting: bool,
 }
 
 impl LongitudinalController {
     /// A controller at rest.
     #[must_use]
-    pub fn new(config: LongitudinalConfig) -> Self {
+    pub(crate) fn new(config: LongitudinalConfig) -> Self {
         Self {
             config,
             integral_m_s2: 0.0,
@@ -144,20 +143,13 @@ impl LongitudinalController {
             in_actuator_s: 0.0,
             service_brake: false,
             pedal_frac: 0.0,
-            switches: 0,
             coasting: false,
         }
     }
 
-    /// Changes between driving and braking so far.
-    #[must_use]
-    pub fn switches(&self) -> u32 {
-        self.switches
-    }
-
     /// One step of `dt_s`.
     #[must_use]
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         dt_s: f64,
         ego: &EgoState,
@@ -252,7 +244,6 @@ impl LongitudinalController {
         if next != self.actuator && (urgent || self.in_actuator_s >= c.dwell_s) {
             self.actuator = next;
             self.in_actuator_s = 0.0;
-            self.switches += 1;
             self.pedal_frac = 0.0;
             self.service_brake = false;
         }

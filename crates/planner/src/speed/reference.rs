@@ -9,9 +9,9 @@ use road::{LaneEnd, ProfilePoint, Road};
 use tractrix_core::{Geometry, SpeedPoint};
 
 /// Spacing of the reference, m.
-pub const STEP_M: f64 = 10.0;
+pub(super) const STEP_M: f64 = 10.0;
 /// Points of the reference: 500 m ahead.
-pub const POINTS: usize = 51;
+pub(super) const POINTS: usize = 51;
 /// Deceleration towards lower limits ahead, m/s².
 const APPROACH_DECEL_M_S2: f64 = 0.5;
 /// The truck stops so far before a lane's end, m.
@@ -19,7 +19,7 @@ const STOP_BEFORE_END_M: f64 = 30.0;
 
 /// What bounds the reference speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpeedBounds {
+pub(crate) struct SpeedBounds {
     /// Set speed, m/s.
     pub set_speed_m_s: f64,
     /// Speed limits of the road count.
@@ -30,7 +30,7 @@ pub struct SpeedBounds {
 
 /// Speed reference from a station on.
 #[derive(Debug, Clone, Default)]
-pub struct ReferenceSpeed {
+pub(crate) struct ReferenceSpeed {
     points: Vec<SpeedPoint>,
     profile: Vec<ProfilePoint>,
 }
@@ -38,7 +38,7 @@ pub struct ReferenceSpeed {
 impl ReferenceSpeed {
     /// Recomputes the reference from `s_m` on, in `lane`. `planned` is the predictive planner's
     /// speed at a station where it has one; it replaces the set speed.
-    pub fn update(
+    pub(crate) fn update(
         &mut self,
         road: &Road,
         lane: u16,
@@ -85,7 +85,7 @@ impl ReferenceSpeed {
     /// Reference speed, m/s, and acceleration, m/s², at a station; rises are not fed forward beyond
     /// 0.3 m/s². `None` before the first update.
     #[must_use]
-    pub fn at(&self, s_m: f64) -> Option<(f64, f64)> {
+    pub(crate) fn at(&self, s_m: f64) -> Option<(f64, f64)> {
         let first = self.points.first()?;
         let x = ((s_m - first.s_m) / STEP_M).clamp(0.0, (self.points.len() - 1) as f64);
         let i = (x as usize).min(self.points.len() - 2);
@@ -99,7 +99,7 @@ impl ReferenceSpeed {
 
     /// The points.
     #[must_use]
-    pub fn points(&self) -> &[SpeedPoint] {
+    pub(crate) fn points(&self) -> &[SpeedPoint] {
         &self.points
     }
 }

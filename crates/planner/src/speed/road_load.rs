@@ -7,7 +7,7 @@ use tractrix_core::{GRAVITY_M_S2, PowertrainLimits, RoadLoad, VehicleLimits};
 
 /// Force that resists motion, N: grade, rolling and air at `speed_m_s` (no wind), grade in rad.
 #[must_use]
-pub fn resistance_n(load: &RoadLoad, speed_m_s: f64, grade_rad: f64) -> f64 {
+pub(super) fn resistance_n(load: &RoadLoad, speed_m_s: f64, grade_rad: f64) -> f64 {
     let weight_n = load.mass_kg * GRAVITY_M_S2;
     let air_n = 0.5 * load.air_density_kg_m3 * load.cd_a_m2 * speed_m_s * speed_m_s.abs();
     weight_n * (libm::sin(grade_rad) + load.rolling_coeff * libm::cos(grade_rad)) + air_n
@@ -15,7 +15,7 @@ pub fn resistance_n(load: &RoadLoad, speed_m_s: f64, grade_rad: f64) -> f64 {
 
 /// The driveline in one gear.
 #[derive(Debug, Clone, Copy)]
-pub struct InGear<'a> {
+pub(super) struct InGear<'a> {
     powertrain: &'a PowertrainLimits,
     /// Crank torque to wheel force, 1/m.
     leverage_1_m: f64,
@@ -32,7 +32,7 @@ impl<'a> InGear<'a> {
     /// The driveline in `gear` (1-based) at `speed_m_s`. Neutral and unknown gears are read as the
     /// gear that a gearbox would choose: the highest with at least 1.5 times idle speed.
     #[must_use]
-    pub fn new(powertrain: &'a PowertrainLimits, gear: u8, speed_m_s: f64) -> Self {
+    pub(super) fn new(powertrain: &'a PowertrainLimits, gear: u8, speed_m_s: f64) -> Self {
         let count = powertrain.gear_ratios.len().max(1);
         let per_speed = powertrain.final_drive_ratio / powertrain.wheel_radius_m;
         let ratio = |i: usize| powertrain.gear_ratios.get(i).copied().unwrap_or(1.0);
@@ -58,41 +58,41 @@ impl<'a> InGear<'a> {
 
     /// Friction and auxiliaries at the crank, Nm, positive.
     #[must_use]
-    pub fn loss_nm(&self) -> f64 {
+    pub(super) fn loss_nm(&self) -> f64 {
         self.powertrain.friction_nm.at(self.engine_speed_rad_s)
             + self.powertrain.auxiliary_power_w / self.engine_speed_rad_s.max(1.0)
     }
 
     /// Wheel force of a net crank torque, N; losses act against the flow of power.
     #[must_use]
-    pub fn force_n(&self, net_nm: f64) -> f64 {
+    pub(super) fn force_n(&self, net_nm: f64) -> f64 {
         let force = net_nm * self.leverage_1_m;
         if net_nm >= 0.0 { force * self.efficiency_frac } else { force / self.efficiency_frac }
     }
 
     /// Net crank torque for a wheel force, Nm.
     #[must_use]
-    pub fn net_torque_nm(&self, force_n: f64) -> f64 {
+    pub(super) fn net_torque_nm(&self, force_n: f64) -> f64 {
         let torque = force_n / self.leverage_1_m;
         if force_n >= 0.0 { torque / self.efficiency_frac } else { torque * self.efficiency_frac }
     }
 
     /// Wheel force without fuel, N (negative).
     #[must_use]
-    pub fn coast_force_n(&self) -> f64 {
+    pub(super) fn coast_force_n(&self) -> f64 {
         self.force_n(-self.loss_nm())
     }
 
     /// Largest wheel force, N.
     #[must_use]
-    pub fn max_force_n(&self) -> f64 {
+    pub(super) fn max_force_n(&self) -> f64 {
         let aux_nm = self.powertrain.auxiliary_power_w / self.engine_speed_rad_s.max(1.0);
         self.force_n(self.powertrain.full_load_nm.at(self.engine_speed_rad_s) - aux_nm)
     }
 
     /// Largest additional braking force of engine brake and retarder, N, positive.
     #[must_use]
-    pub fn max_retarder_force_n(&self) -> f64 {
+    pub(super) fn max_retarder_force_n(&self) -> f64 {
         self.powertrain.engine_brake_nm.at(self.engine_speed_rad_s) * self.leverage_1_m
             / self.efficiency_frac
             + self.retarder_n
@@ -100,7 +100,7 @@ impl<'a> InGear<'a> {
 
     /// Accelerator pedal, 0 to 1, that gives the wheel force, by inverting the pedal map.
     #[must_use]
-    pub fn pedal_frac(&self, force_n: f64) -> f64 {
+    pub(super) fn pedal_frac(&self, force_n: f64) -> f64 {
         let indicated_nm = self.net_torque_nm(force_n) + self.loss_nm();
         if indicated_nm <= 0.0 {
             return 0.0;
@@ -127,6 +127,6 @@ impl<'a> InGear<'a> {
 
 /// Mass that the wheels have to accelerate in this gear, kg.
 #[must_use]
-pub fn effective_mass_kg(limits: &VehicleLimits, in_gear: &InGear<'_>) -> f64 {
+pub(super) fn effective_mass_kg(limits: &VehicleLimits, in_gear: &InGear<'_>) -> f64 {
     limits.road_load.mass_kg + in_gear.rotating_mass_kg
 }

@@ -20,9 +20,9 @@ use serde::{Deserialize, Serialize};
 use tractrix_core::{EgoState, Geometry, LateralLimits, VehicleLimits};
 
 /// Curvature samples in the preview, [`PREVIEW_STEP_S`] apart.
-pub const PREVIEW_POINTS: usize = 26;
+pub(crate) const PREVIEW_POINTS: usize = 26;
 /// Spacing of the preview, s.
-pub const PREVIEW_STEP_S: f64 = 0.1;
+pub(crate) const PREVIEW_STEP_S: f64 = 0.1;
 
 const SPEEDS_M_S: [f64; 10] = [3.0, 5.0, 7.5, 10.0, 12.5, 15.0, 18.0, 22.0, 26.0, 30.0];
 const TRAILER_MASS_FACTORS: [f64; 3] = [0.25, 0.6, 1.2];
@@ -83,7 +83,7 @@ struct GridPoint {
 
 /// Where the truck is relative to its path.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PathError {
+pub(crate) struct PathError {
     /// Offset of the reference point, m, left positive.
     pub offset_m: f64,
     /// Tractor heading minus path heading, rad.
@@ -92,7 +92,7 @@ pub struct PathError {
 
 /// The steering controller.
 #[derive(Debug, Clone)]
-pub struct LateralController {
+pub(crate) struct LateralController {
     config: LateralConfig,
     dt_s: f64,
     /// `TRAILER_MASS_FACTORS` blocks of `SPEEDS_M_S` points.
@@ -108,7 +108,7 @@ impl LateralController {
     ///
     /// # Errors
     /// [`PlannerError::Riccati`] names the grid point for which the data give no stabilising gain.
-    pub fn new(
+    pub(crate) fn new(
         config: LateralConfig,
         limits: &VehicleLimits,
         dt_s: f64,
@@ -138,7 +138,7 @@ impl LateralController {
     /// Road-wheel angle, rad, for this control step. `curvature_1_m` is the path's curvature at the
     /// truck and then every [`PREVIEW_STEP_S`] of driving ahead.
     #[must_use]
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         ego: &EgoState,
         error: PathError,
@@ -186,13 +186,18 @@ impl LateralController {
     /// Road-wheel angle, rad, that holds a curve of this curvature in steady state: for steering
     /// when the truck's state is not known.
     #[must_use]
-    pub fn steady_road_wheel_rad(&self, curvature_1_m: f64, speed_m_s: f64, mass_kg: f64) -> f64 {
+    pub(crate) fn steady_road_wheel_rad(
+        &self,
+        curvature_1_m: f64,
+        speed_m_s: f64,
+        mass_kg: f64,
+    ) -> f64 {
         let weights = self.weights(speed_m_s, mass_kg);
         self.blend_scalar(&weights, |p| p.model.u_steady) * curvature_1_m
     }
 
     /// Takes note of a command that was sent in place of this controller's.
-    pub fn overridden(&mut self, road_wheel_rad: f64) {
+    pub(crate) fn overridden(&mut self, road_wheel_rad: f64) {
         self.last_rad = road_wheel_rad;
         if let Some(last) = self.pending_rad.back_mut() {
             *last = road_wheel_rad;

@@ -129,7 +129,7 @@ pub struct PlannedChange {
 ///
 /// # Errors
 /// [`LaneChangeRefusal::NoTargetLane`].
-pub fn target_lane(
+pub(super) fn target_lane(
     road: &Road,
     lane: u16,
     wish: LaneChoice,
@@ -205,7 +205,7 @@ pub fn plan_change(
 /// Plans the way back to lane `own`: the shortest course within the abort limits, the longest one
 /// if none is.
 #[must_use]
-pub fn plan_abort(config: &LaneChangeConfig, start: &Start<'_>, own: u16) -> LateralPath {
+pub(super) fn plan_abort(config: &LaneChangeConfig, start: &Start<'_>, own: u16) -> LateralPath {
     let v = start.ego.speed_m_s.max(1.0);
     let corridor = Corridor::new(start.road, own, start.path.lane);
     let f = config.abort_factor;

@@ -21,7 +21,7 @@ enum Phase {
 
 /// What the state machine looks at.
 #[derive(Debug, Clone, Copy)]
-pub struct Situation<'a> {
+pub(crate) struct Situation<'a> {
     /// Time.
     pub now: Time,
     /// The truck.
@@ -40,7 +40,7 @@ pub struct Situation<'a> {
 
 /// The manoeuvre and its path.
 #[derive(Debug, Clone)]
-pub struct ManeuverPlanner {
+pub(crate) struct ManeuverPlanner {
     config: LaneChangeConfig,
     rss: RssConfig,
     phase: Phase,
@@ -51,19 +51,19 @@ pub struct ManeuverPlanner {
 impl ManeuverPlanner {
     /// Starts on a path, in lane keeping.
     #[must_use]
-    pub fn new(config: LaneChangeConfig, rss: RssConfig, path: LateralPath) -> Self {
+    pub(crate) fn new(config: LaneChangeConfig, rss: RssConfig, path: LateralPath) -> Self {
         Self { config, rss, phase: Phase::Keep, path, quiet_until: Time(i64::MIN) }
     }
 
     /// The path.
     #[must_use]
-    pub fn path(&self) -> &LateralPath {
+    pub(crate) fn path(&self) -> &LateralPath {
         &self.path
     }
 
     /// The manoeuvre.
     #[must_use]
-    pub fn maneuver(&self) -> Maneuver {
+    pub(crate) fn maneuver(&self) -> Maneuver {
         match self.phase {
             Phase::Keep => Maneuver::KeepLane,
             Phase::Change { choice: LaneChoice::Left, .. } => Maneuver::ChangeLeft,
@@ -74,26 +74,16 @@ impl ManeuverPlanner {
 
     /// The lane that the truck is in, or leaves.
     #[must_use]
-    pub fn lane(&self) -> u16 {
+    pub(crate) fn lane(&self) -> u16 {
         match self.phase {
             Phase::Change { own, .. } => own,
             Phase::Keep | Phase::Abort { .. } => self.path.lane,
         }
     }
 
-    /// The other lane that the truck's body may reach into.
-    #[must_use]
-    pub fn other_lane(&self) -> Option<u16> {
-        match self.phase {
-            Phase::Keep => None,
-            Phase::Change { .. } => Some(self.path.lane),
-            Phase::Abort { target } => Some(target),
-        }
-    }
-
     /// Planned speed, m/s, and acceleration, m/s², of a change under way.
     #[must_use]
-    pub fn planned_speed(&self, now: Time) -> Option<(f64, f64)> {
+    pub(crate) fn planned_speed(&self, now: Time) -> Option<(f64, f64)> {
         let Phase::Change { course, began, .. } = self.phase else {
             return None;
         };
@@ -106,7 +96,7 @@ impl ManeuverPlanner {
     ///
     /// # Errors
     /// Why it is not driven.
-    pub fn request(
+    pub(crate) fn request(
         &mut self,
         choice: LaneChoice,
         at: &Situation<'_>,
@@ -129,7 +119,7 @@ impl ManeuverPlanner {
     }
 
     /// Checks a change under way and ends what is complete. Returns the reason of an abort.
-    pub fn update(&mut self, at: &Situation<'_>) -> Option<LaneChangeRefusal> {
+    pub(crate) fn update(&mut self, at: &Situation<'_>) -> Option<LaneChangeRefusal> {
         let done = self.path.offset.is_none_or(|q| at.ego.s_m >= q.end_s_m());
         if done {
             if self.phase != Phase::Keep {

@@ -18,16 +18,16 @@ use nalgebra::{SMatrix, SVector};
 use tractrix_core::{Geometry, LateralLimits};
 
 /// State vector.
-pub type State = SVector<f64, 7>;
+pub(super) type State = SVector<f64, 7>;
 /// State matrix.
-pub type Matrix = SMatrix<f64, 7, 7>;
+pub(super) type Matrix = SMatrix<f64, 7, 7>;
 
 /// Lowest speed at which the linear model is used, m/s; below it is stiff and the truck kinematic.
-pub const LOWEST_SPEED_M_S: f64 = 3.0;
+pub(crate) const LOWEST_SPEED_M_S: f64 = 3.0;
 
 /// Discrete model `x+ = A x + B u + E kappa` and its steady state per unit of curvature.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DiscreteModel {
+pub(super) struct DiscreteModel {
     /// State matrix.
     pub a: Matrix,
     /// Input vector.
@@ -81,7 +81,7 @@ fn yaw_model(
 
 /// The discrete model at `speed_m_s` for steps of `dt_s`; `None` if the data are degenerate.
 #[must_use]
-pub fn discrete_model(
+pub(super) fn discrete_model(
     l: &LateralLimits,
     g: &Geometry,
     speed_m_s: f64,
@@ -145,7 +145,7 @@ fn exponential(m: &SMatrix<f64, 9, 9>) -> SMatrix<f64, 9, 9> {
 /// Solves the discrete algebraic Riccati equation `P = A'P(I + B B'P/r)^-1 A + Q` by structured
 /// doubling (Chu, Fan, Lin 2004): quadratic convergence. `None` without convergence.
 #[must_use]
-pub fn solve_dare(a: &Matrix, b: &State, q: &Matrix, r: f64) -> Option<Matrix> {
+pub(super) fn solve_dare(a: &Matrix, b: &State, q: &Matrix, r: f64) -> Option<Matrix> {
     let (mut a_k, mut g_k, mut h_k) = (*a, b * b.transpose() / r, *q);
     for _ in 0..60 {
         let w = (Matrix::identity() + g_k * h_k).try_inverse()?;

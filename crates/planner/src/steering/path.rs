@@ -103,7 +103,7 @@ pub struct LateralPath {
 
 /// Centre of a lane and its slope; the second derivative is taken as zero.
 #[must_use]
-pub fn lane_centre(road: &Road, lane: u16, s_m: f64) -> Lateral {
+pub(super) fn lane_centre(road: &Road, lane: u16, s_m: f64) -> Lateral {
     let Some(track) = road.lanes().get(usize::from(lane)) else {
         return Lateral::default();
     };
@@ -173,7 +173,7 @@ impl LateralPath {
 
 /// Heading relative to the road, rad, and map curvature, 1/m, of a lateral course.
 #[must_use]
-pub fn direction(lateral: &Lateral, road_curvature_1_m: f64) -> (f64, f64) {
+pub(super) fn direction(lateral: &Lateral, road_curvature_1_m: f64) -> (f64, f64) {
     let k_r = road_curvature_1_m;
     let stretch = (1.0 - k_r * lateral.d_m).max(0.05);
     let tan = lateral.slope / stretch;

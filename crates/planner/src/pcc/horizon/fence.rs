@@ -40,7 +40,7 @@ pub struct LeadAhead {
 
 /// Earliest times, and a profile that keeps them.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Fence {
+pub(super) struct Fence {
     /// Earliest time per node, s; `-∞` where it does not bind.
     pub earliest_s: Vec<f64>,
     /// Energies per node of a profile that keeps them, J/kg.
@@ -58,7 +58,7 @@ impl Fence {
     /// The fence of `lead`, which is predicted for `valid_s`; `free_e` is the profile that would be
     /// driven without it (energies per node).
     #[must_use]
-    pub fn new(
+    pub(super) fn new(
         truck: &Truck,
         course: &Course,
         free_e: &[f64],
@@ -107,7 +107,7 @@ impl Fence {
 
     /// Whether a profile (energies per node) passes a node too early.
     #[must_use]
-    pub fn cuts(&self, h_m: f64, e_j_kg: &[f64]) -> bool {
+    pub(super) fn cuts(&self, h_m: f64, e_j_kg: &[f64]) -> bool {
         let mut t = 0.0;
         e_j_kg.windows(2).zip(self.earliest_s.iter().skip(1)).any(|(w, &earliest)| {
             t += duration_s(h_m, w[0], w[1]);

@@ -14,9 +14,9 @@ use super::truck::Truck;
 use crate::pcc::error::{PccError, check};
 
 /// Largest number of intervals of a course.
-pub const MAX_INTERVALS: usize = 20_000;
+pub(super) const MAX_INTERVALS: usize = 20_000;
 /// Lowest speed that is planned, m/s; the space domain ends at standstill.
-pub const MIN_SPEED_M_S: f64 = 1.0;
+pub(crate) const MIN_SPEED_M_S: f64 = 1.0;
 
 /// What the driver or operator asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]

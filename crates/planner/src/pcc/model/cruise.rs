@@ -17,7 +17,7 @@ use crate::pcc::search::{GearChoice, choose_gears};
 ///
 /// # Errors
 /// [`PccError::TooSteep`] where full traction stalls the truck.
-pub fn cruise_energies(
+pub(crate) fn cruise_energies(
     truck: &Truck,
     course: &Course,
     start_e: f64,
@@ -64,7 +64,7 @@ pub fn cruise_energies(
 ///
 /// # Errors
 /// As [`cruise_energies`].
-pub fn cruise_trip(
+pub(crate) fn cruise_trip(
     truck: &Truck,
     course: &Course,
     start_e: f64,

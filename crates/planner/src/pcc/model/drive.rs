@@ -14,7 +14,7 @@ pub(crate) const E_FLOOR: f64 = 0.18;
 
 /// What one interval took.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Leg {
+pub(crate) struct Leg {
     /// Energy at the end, J/kg.
     pub end_e_j_kg: f64,
     /// Duration, s.
@@ -204,7 +204,7 @@ pub(crate) fn needed_before(
 }
 
 /// Drives interval `k` toward `target_e`, with no more than full load and the planned brakes.
-pub fn drive_leg(
+pub(crate) fn drive_leg(
     truck: &Truck,
     course: &Course,
     k: usize,

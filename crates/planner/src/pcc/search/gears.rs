@@ -14,7 +14,7 @@ use crate::pcc::model::{Course, Drive, Truck, demand_m_s2};
 
 /// What the gear choice is told beyond the profile.
 #[derive(Debug, Clone, Copy)]
-pub struct GearChoice<'a> {
+pub(crate) struct GearChoice<'a> {
     /// Fuel charged per shift, g.
     pub shift_fuel_g: f64,
     /// Worth of traction per interval, g per m/s², and whether the profile is power-limited there.
@@ -28,7 +28,7 @@ pub struct GearChoice<'a> {
 impl GearChoice<'_> {
     /// Gears that follow a profile as well as they can, with the least fuel.
     #[must_use]
-    pub fn follow(shift_fuel_g: f64) -> Self {
+    pub(crate) fn follow(shift_fuel_g: f64) -> Self {
         Self { shift_fuel_g, worth: None, start: None, allowed: None }
     }
 }
@@ -38,7 +38,7 @@ const DEFICIT_FACTOR: f64 = 1.5;
 
 /// Gears per interval for the energies `e` (one per node).
 #[must_use]
-pub fn choose_gears(
+pub(crate) fn choose_gears(
     truck: &Truck,
     course: &Course,
     e: &[f64],

@@ -14,7 +14,7 @@
 
 use alloc::vec::Vec;
 
-use crate::pcc::model::{Course, Drive, Truck, duration_s};
+use crate::pcc::model::{Course, Drive, Truck};
 
 /// Energy step of the engine tables, J/kg.
 const TABLE_STEP: f64 = 0.5;
@@ -142,7 +142,7 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 
 /// Nodes with their windows of energies, and the intervals between them.
 #[derive(Debug, Clone, Default)]
-pub struct SearchGrid {
+pub(crate) struct SearchGrid {
     /// Length of an interval, m.
     pub h_m: f64,
     /// sin of the grade per interval.
@@ -163,7 +163,7 @@ impl SearchGrid {
     /// A grid over `course`, `merge` intervals at a time, between `e_min` and `e_max` (per node of
     /// the course), from `start_e` to the index nearest to `end_e` (all within half a step).
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         course: &Course,
         merge: usize,
         step_e: f64,
@@ -199,13 +199,13 @@ impl SearchGrid {
 
     /// Node of the course that node `k` of `coarse` intervals stands for.
     #[must_use]
-    pub fn node(n: usize, coarse: usize, k: usize) -> usize {
+    pub(crate) fn node(n: usize, coarse: usize, k: usize) -> usize {
         if k >= coarse { n } else { k * n / coarse }
     }
 
     /// Number of intervals.
     #[must_use]
-    pub fn n(&self) -> usize {
+    pub(crate) fn n(&self) -> usize {
         self.sin.len()
     }
 
@@ -216,7 +216,7 @@ impl SearchGrid {
 
 /// Prices and limits of a search.
 #[derive(Debug, Clone, Copy)]
-pub struct SearchPrices {
+pub(crate) struct SearchPrices {
     /// Price of time, g/s.
     pub beta_g_s: f64,
     /// Fuel per shift, g.
@@ -231,20 +231,16 @@ pub struct SearchPrices {
 
 /// The cheapest path.
 #[derive(Debug, Clone)]
-pub struct SearchPath {
+pub(crate) struct SearchPath {
     /// Energy per node, J/kg.
     pub e_j_kg: Vec<f64>,
     /// Gear index per interval.
     pub gears: Vec<u8>,
-    /// Cost, g.
-    pub cost_g: f64,
-    /// Duration, s.
-    pub time_s: f64,
 }
 
 /// The cheapest path through the grid; `None` if there is none. `start_gear` costs a shift to leave.
 #[must_use]
-pub fn search(
+pub(crate) fn search(
     truck: &Truck,
     tables: &EngineTables,
     grid: &SearchGrid,
@@ -312,8 +308,7 @@ pub fn search(
         speeds = after;
     }
     let end = (0..ways.len()).min_by(|&a, &b| ways[a].cost_g.total_cmp(&ways[b].cost_g))?;
-    let cost_g = ways[end].cost_g;
-    if !cost_g.is_finite() {
+    if !ways[end].cost_g.is_finite() {
         return None;
     }
     let last = grid.count[n] as usize;
@@ -326,8 +321,7 @@ pub fn search(
         let from = parents[k][slot * grid.count[k + 1] as usize + at] as usize;
         (at, slot) = (from / m, from % m);
     }
-    let time_s = e.windows(2).map(|w| duration_s(grid.h_m, w[0], w[1])).sum();
-    Some(SearchPath { e_j_kg: e, gears: path, cost_g, time_s })
+    Some(SearchPath { e_j_kg: e, gears: path })
 }
 
 /// Smallest integer not below `x`, saturating. A cast is one instruction where `ceil` is a call.

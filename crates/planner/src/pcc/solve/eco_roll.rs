@@ -32,7 +32,7 @@ const BRAKING_M_S2: f64 = 1e-3;
 const ROUNDS: usize = 3;
 
 /// The plan solved again with its coasting phases open; `None` if no phase is worth it.
-pub fn opened(
+pub(crate) fn opened(
     problem: &Problem<'_>,
     plan: &Profile,
     driven: &Driven,
@@ -71,7 +71,7 @@ pub fn opened(
 
 /// Whether a brake works in an open interval.
 #[must_use]
-pub fn runs_away(driven: &Driven, k: usize) -> bool {
+pub(crate) fn runs_away(driven: &Driven, k: usize) -> bool {
     driven.drive[k] == Drive::Neutral && driven.brake_m_s2[k] > BRAKING_M_S2
 }
 

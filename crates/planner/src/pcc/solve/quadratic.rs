@@ -9,7 +9,7 @@ use super::lin::Subproblem;
 
 /// `½ xᵀH x + gᵀx` over `x = (E_1..E_N, b_0..b_{N-1})`.
 #[derive(Debug, Clone, Default)]
-pub struct Quadratic {
+pub(super) struct Quadratic {
     /// Diagonal of H over E; entry `i` belongs to node `i+1`.
     pub d0: Vec<f64>,
     /// First off-diagonal: `d1[i]` couples nodes `i+1` and `i+2`.
@@ -30,7 +30,7 @@ pub struct Quadratic {
 
 impl Quadratic {
     /// Assembles the cost with a linear time price `beta_g_s` (zero when time is a constraint).
-    pub fn assemble(&mut self, sub: &Subproblem, beta_g_s: f64) {
+    pub(super) fn assemble(&mut self, sub: &Subproblem, beta_g_s: f64) {
         let n = sub.n;
         for v in [
             &mut self.d0,

@@ -313,7 +313,7 @@ fn hold_minimum(problem: &Problem<'_>, now: &mut Profile) {
 
 /// Gears chosen anew along a profile, among those used nearby, at the profile's worth of traction.
 #[must_use]
-pub fn refined_gears(problem: &Problem<'_>, profile: &Profile) -> Vec<Drive> {
+pub(crate) fn refined_gears(problem: &Problem<'_>, profile: &Profile) -> Vec<Drive> {
     let reach = libm::round(2.0 * SEARCH_INTERVAL_M / problem.course.h_m) as usize;
     choose_gears(
         problem.truck,

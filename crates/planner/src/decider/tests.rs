@@ -1,14 +1,10 @@
 //! The deciders against their published rules, written out independently.
-#![allow(clippy::unwrap_used)]
 
-mod support;
-
-use planner::LaneChoice;
-use planner::decider::{MobilConfig, View, mobil, rules};
+use super::{LaneChoice, MobilConfig, View, mobil, rules};
+use crate::testing::reference_geometry;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use road::{Road, builtin};
-use support::data_sheet::reference_geometry;
 use tractrix_core::{EgoState, Neighbour, Scene, VehicleClass};
 
 /// Random vehicles on two lanes, none overlapping the ego.
