@@ -15,6 +15,7 @@ extern crate alloc;
 mod command;
 mod ego;
 mod error;
+mod fuel;
 mod limits;
 mod plan;
 mod provenance;
@@ -26,10 +27,8 @@ mod time;
 pub use command::{BrakeMode, Command, GearRequest};
 pub use ego::{EgoState, PowertrainSignals, TrailerState};
 pub use error::CoreError;
-pub use limits::{
-    BrakeLimits, FuelModel, Geometry, LateralLimits, PowertrainLimits, RPM_PER_RAD_S, RoadLoad,
-    VehicleLimits,
-};
+pub use fuel::{FuelModel, LowLoadFuel, RPM_PER_RAD_S};
+pub use limits::{BrakeLimits, Geometry, LateralLimits, PowertrainLimits, RoadLoad, VehicleLimits};
 pub use plan::{GuardReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus, SpeedPoint};
 pub use provenance::Provenance;
 pub use scene::{Neighbour, Scene, VehicleClass};

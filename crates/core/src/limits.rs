@@ -6,7 +6,7 @@
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::{Curve, Grid};
+use crate::{Curve, FuelModel, Grid};
 
 /// Lengths of the combination. "Ahead" and "behind" refer to the reference point: the centre of
 /// the tractor's drive-axle group, on the ground.
@@ -45,65 +45,6 @@ impl Geometry {
         self.front_m + self.rear_m()
     }
 }
-
-/// Fuel mass flow from engine speed and torque.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub enum FuelModel {
-    /// Willans line on indicated power: `idle + per_rpm n + per_kw P_ind`.
-    Willans {
-        /// Constant part, g/s.
-        constant_g_s: f64,
-        /// Part per engine speed, g/s per rpm.
-        per_rpm_g_s: f64,
-        /// Part per indicated power, g/s per kW.
-        per_kw_g_s: f64,
-    },
-    /// Brake-specific consumption map over speed (rad/s) and brake torque (Nm), g/kWh, with the
-    /// flow at zero brake torque as a separate curve over speed.
-    Map {
-        /// g/kWh over (engine speed rad/s, brake torque Nm).
-        bsfc_g_kwh: Grid,
-        /// g/s over engine speed (rad/s) at zero brake torque.
-        zero_torque_g_s: Curve,
-    },
-}
-
-impl FuelModel {
-    /// Fuel flow, g/s. `indicated_nm` is the gas torque, `friction_nm` the positive friction
-    /// torque; brake torque is their difference. Zero when nothing is injected (fuel cut).
-    ///
-    /// The map is blended between the zero-torque curve and its lowest torque row, where BSFC
-    /// diverges.
-    #[must_use]
-    pub fn rate_g_s(&self, speed_rad_s: f64, indicated_nm: f64, friction_nm: f64) -> f64 {
-        if indicated_nm <= 0.0 {
-            return 0.0;
-        }
-        match self {
-            Self::Willans { constant_g_s, per_rpm_g_s, per_kw_g_s } => {
-                constant_g_s
-                    + per_rpm_g_s * speed_rad_s * RPM_PER_RAD_S
-                    + per_kw_g_s * indicated_nm * speed_rad_s * 1e-3
-            }
-            Self::Map { bsfc_g_kwh, zero_torque_g_s } => {
-                let brake_nm = indicated_nm - friction_nm;
-                let zero = zero_torque_g_s.at(speed_rad_s);
-                let flow = |t: f64| bsfc_g_kwh.at(speed_rad_s, t) * t * speed_rad_s * 1e-3 / 3600.0;
-                let lowest = bsfc_g_kwh.y()[0].max(1.0);
-                if brake_nm >= lowest {
-                    flow(brake_nm)
-                } else if brake_nm >= 0.0 {
-                    zero + (flow(lowest) - zero) * brake_nm / lowest
-                } else {
-                    zero * indicated_nm / friction_nm.max(1e-9)
-                }
-            }
-        }
-    }
-}
-
-/// Revolutions per minute in one rad/s.
-pub const RPM_PER_RAD_S: f64 = 9.549_296_585_513_72;
 
 /// Engine and driveline as a planner needs them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -191,7 +191,7 @@ impl TruckModel {
                 auxiliary_power_w: e.auxiliary_power_w,
                 idle_speed_rad_s: idle,
                 max_speed_rad_s: self.engine.max_rad_s,
-                fuel: self.engine.fuel_model(),
+                fuel: self.engine.fuel.clone(),
                 idle_fuel_g_s: self.engine.fuel_rate_g_s(idle, holding),
                 shift_duration_s: p.shift.duration_scale_coeff
                     * (p.shift.ramp_down_s + p.shift.open_s + p.shift.ramp_up_s),

@@ -20,7 +20,8 @@ use crate::effects::shift::ShiftParameters;
 use crate::effects::table::TableEffect;
 use crate::lateral::LateralParameters;
 
-const BUILTIN: [(&str, &str); 3] = [
+const BUILTIN: [(&str, &str); 4] = [
+    ("longhaul", include_str!("../trucks/longhaul.toml")),
     ("sinotruk", include_str!("../trucks/sinotruk.toml")),
     ("reference", include_str!("../trucks/reference.toml")),
     ("iits", include_str!("../trucks/iits.toml")),

@@ -18,7 +18,7 @@ use planner::pcc::solve::DefaultSolver;
 use planner::pcc::trip::{Trip, TripRequest, TripStatus, plan_trip};
 use planner::pcc::{SpeedBand, Tuning};
 use road::ProfilePoint;
-use tractrix_core::{FuelModel, VehicleLimits};
+use tractrix_core::{FuelModel, LowLoadFuel, VehicleLimits};
 
 const BANDS_KM_H: [(f64, f64); 3] = [(65.0, 79.0), (60.0, 85.0), (50.0, 90.0)];
 
@@ -43,8 +43,12 @@ fn truck(mass_kg: f64, engine: Engine) -> VehicleLimits {
     match engine {
         Engine::Willans => {}
         Engine::Continuous => {
-            limits.powertrain.fuel =
-                FuelModel::Willans { constant_g_s: 0.0, per_rpm_g_s: 0.0, per_kw_g_s: 0.052 };
+            limits.powertrain.fuel = FuelModel::Willans {
+                constant_g_s: 0.0,
+                per_rpm_g_s: 0.0,
+                per_kw_g_s: 0.052,
+                low_load: LowLoadFuel::default(),
+            };
         }
         Engine::BenchMap => limits.powertrain.fuel = corpus::bench_map(),
     }

@@ -64,7 +64,7 @@ pub struct Scenario {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TruckSection {
-    /// Built-in name (`sinotruk`, `reference`) or path of a truck file.
+    /// Built-in name (`longhaul`, `reference`) or path of a truck file.
     pub file: String,
     /// Payload on the trailer, kg.
     pub payload_kg: f64,

@@ -19,6 +19,7 @@ use serde::{Deserialize, Serialize};
 use tractrix_core::{Curve, FuelModel, Grid, RPM_PER_RAD_S};
 
 use crate::bounds::Bounds;
+use crate::effects::fuel::{FuelMap, FuelParameters, Range};
 
 /// The engine block of a truck file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -93,6 +94,9 @@ pub struct EngineParameters {
     pub engine_brake_lag_s: f64,
     /// Fuel.
     pub fuel: FuelParameters,
+    /// Fuel map, instead of the Willans line of `fuel`.
+    #[serde(default)]
+    pub fuel_map: Option<FuelMap>,
 }
 
 /// Demand over pedal and speed.
@@ -107,26 +111,6 @@ pub struct PedalMap {
     pub torque_nm: Vec<Vec<f64>>,
 }
 
-/// Fuel: Willans line on indicated power.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FuelParameters {
-    /// Constant part, g/s.
-    pub constant_g_s: f64,
-    /// Part per speed, g/s per rpm.
-    pub per_rpm_g_s: f64,
-    /// Part per indicated power, g/s per kW.
-    pub per_kw_g_s: f64,
-    /// Extra consumption at low load, relative, fading out towards `low_load_kw`.
-    #[serde(default)]
-    pub low_load_extra_frac: f64,
-    /// Indicated power at which the extra has faded out, kW.
-    #[serde(default = "low_load_kw")]
-    pub low_load_kw: f64,
-    /// Density, kg/m³.
-    pub density_kg_m3: f64,
-}
-
 fn one() -> f64 {
     1.0
 }
@@ -139,11 +123,15 @@ fn derate_altitude_m() -> f64 {
 fn derate_air_k() -> f64 {
     308.15
 }
-fn low_load_kw() -> f64 {
-    80.0
-}
 
 impl EngineParameters {
+    /// Friction torque as the file gives it, unscaled, over speed (rad/s), Nm.
+    fn nominal_friction(&self) -> Result<Curve, tractrix_core::CoreError> {
+        let rpm = [0.0, 10_000.0];
+        let nm = rpm.map(|n| self.friction_constant_nm + self.friction_per_rpm_nm * n);
+        Curve::new("friction", rpm.map(|n| n / RPM_PER_RAD_S).to_vec(), nm.to_vec())
+    }
+
     pub(crate) fn violations(&self) -> Vec<String> {
         let mut b = Bounds::of("engine");
         b.curve("full_load_torque_nm", &self.full_load_speed_rpm, &self.full_load_torque_nm);
@@ -173,12 +161,12 @@ impl EngineParameters {
         b.within("engine_brake_constant_nm", self.engine_brake_constant_nm, 0.0, 5_000.0);
         b.within("engine_brake_per_rpm_nm", self.engine_brake_per_rpm_nm, 0.0, 5.0);
         b.within("engine_brake_lag_s", self.engine_brake_lag_s, 0.005, 5.0);
-        b.within("fuel.constant_g_s", self.fuel.constant_g_s, 0.0, 5.0);
-        b.within("fuel.per_rpm_g_s", self.fuel.per_rpm_g_s, 0.0, 0.01);
-        b.within("fuel.per_kw_g_s", self.fuel.per_kw_g_s, 0.01, 0.2);
-        b.within("fuel.low_load_extra_frac", self.fuel.low_load_extra_frac, -0.5, 2.0);
-        b.within("fuel.low_load_kw", self.fuel.low_load_kw, 1.0, 500.0);
-        b.within("fuel.density_kg_m3", self.fuel.density_kg_m3, 600.0, 1_000.0);
+        let range = Range {
+            idle_rpm: self.idle_speed_rpm,
+            max_rpm: self.max_speed_rpm,
+            full_load_nm: self.full_load_torque_nm.iter().copied().fold(0.0, f64::max),
+        };
+        self.fuel.check(self.fuel_map.as_ref(), range, &mut b);
         if let Some(map) = &self.pedal_map {
             b.result("pedal_map", map.grid().map(|_| ()));
         }
@@ -221,6 +209,8 @@ pub struct Engine {
     pub idle_rad_s: f64,
     /// Governed speed, rad/s.
     pub max_rad_s: f64,
+    /// Fuel flow: the same model that planner and diagnosis read.
+    pub fuel: FuelModel,
 }
 
 impl Engine {
@@ -229,8 +219,9 @@ impl Engine {
     /// # Errors
     /// [`tractrix_core::CoreError::BadTable`] names a table that cannot be used.
     pub fn new(p: EngineParameters) -> Result<Self, tractrix_core::CoreError> {
-        let speed = p.full_load_speed_rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
+        let speed: Vec<f64> = p.full_load_speed_rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
         Ok(Self {
+            fuel: p.fuel.model(p.fuel_map.as_ref(), p.nominal_friction()?)?,
             full_load_nm: Curve::new("full_load_torque_nm", speed, p.full_load_torque_nm.clone())?,
             pedal_map_nm: p.pedal_map.as_ref().map(PedalMap::grid).transpose()?,
             idle_rad_s: p.idle_speed_rpm / RPM_PER_RAD_S,
@@ -322,23 +313,10 @@ impl Engine {
         p.engine_brake_constant_nm + p.engine_brake_per_rpm_nm * speed_rad_s * RPM_PER_RAD_S
     }
 
-    /// Fuel flow, g/s: Willans line of [`FuelModel`] plus the low-load extra.
+    /// Fuel flow, g/s, at a speed and an indicated torque.
+    #[inline]
     #[must_use]
     pub fn fuel_rate_g_s(&self, speed_rad_s: f64, indicated_nm: f64) -> f64 {
-        let f = &self.parameters.fuel;
-        let kw = indicated_nm * speed_rad_s * 1e-3;
-        let extra = f.low_load_extra_frac * (1.0 - kw / f.low_load_kw).max(0.0);
-        self.fuel_model().rate_g_s(speed_rad_s, indicated_nm, 0.0) * (1.0 + extra)
-    }
-
-    /// The fuel model as a planner sees it.
-    #[must_use]
-    pub const fn fuel_model(&self) -> FuelModel {
-        let f = &self.parameters.fuel;
-        FuelModel::Willans {
-            constant_g_s: f.constant_g_s,
-            per_rpm_g_s: f.per_rpm_g_s,
-            per_kw_g_s: f.per_kw_g_s,
-        }
+        self.fuel.rate_g_s(speed_rad_s, indicated_nm)
     }
 }

@@ -3,6 +3,7 @@
 pub mod brake;
 pub mod driveline;
 pub mod engine;
+pub mod fuel;
 pub mod instruments;
 pub mod resistance;
 pub mod shift;

@@ -4,8 +4,8 @@
 use std::vec;
 use std::vec::Vec;
 use tractrix_core::{
-    BrakeLimits, Curve, FuelModel, Geometry, LateralLimits, PowertrainLimits, RPM_PER_RAD_S,
-    RoadLoad, VehicleLimits,
+    BrakeLimits, Curve, FuelModel, Geometry, LateralLimits, LowLoadFuel, PowertrainLimits,
+    RPM_PER_RAD_S, RoadLoad, VehicleLimits,
 };
 
 /// Geometry of the reference truck.
@@ -85,6 +85,7 @@ pub fn reference_limits() -> VehicleLimits {
                 constant_g_s: 0.05,
                 per_rpm_g_s: 0.000_12,
                 per_kw_g_s: 0.0505,
+                low_load: LowLoadFuel::default(),
             },
             idle_fuel_g_s: 0.6,
             shift_duration_s: 1.0,

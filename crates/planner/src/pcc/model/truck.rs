@@ -18,7 +18,7 @@
 
 use alloc::{format, vec::Vec};
 
-use tractrix_core::{Curve, FuelModel, GRAVITY_M_S2, VehicleLimits};
+use tractrix_core::{Curve, FuelModel, GRAVITY_M_S2, LowLoadFuel, VehicleLimits};
 
 use super::engine::TorqueCurves;
 use crate::pcc::error::{PccError, check};
@@ -332,7 +332,7 @@ impl Operating<'_> {
     pub fn fuel_g_s(&self, p_m_s2: f64) -> f64 {
         let torque = self.indicated_nm(p_m_s2);
         let torque = if torque < 1e-6 { 0.0 } else { torque };
-        self.truck.fuel.rate_g_s(self.speed_rad_s, torque, self.friction_nm)
+        self.truck.fuel.rate_g_s(self.speed_rad_s, torque)
     }
 
     /// Fuel flow, g/s, with the part that does not depend on torque charged at cut-off too: the
@@ -341,7 +341,7 @@ impl Operating<'_> {
     #[must_use]
     pub fn fuel_charged_g_s(&self, p_m_s2: f64) -> f64 {
         let torque = self.indicated_nm(p_m_s2).max(1e-6);
-        self.truck.fuel.rate_g_s(self.speed_rad_s, torque, self.friction_nm)
+        self.truck.fuel.rate_g_s(self.speed_rad_s, torque)
     }
 }
 
@@ -364,27 +364,35 @@ fn check_curve(name: &str, c: &Curve, low: f64, high: f64) -> Result<(), PccErro
 
 fn check_fuel(fuel: &FuelModel) -> Result<(), PccError> {
     match fuel {
-        FuelModel::Willans { constant_g_s, per_rpm_g_s, per_kw_g_s } => {
+        FuelModel::Willans { constant_g_s, per_rpm_g_s, per_kw_g_s, low_load } => {
+            check_low_load(low_load)?;
             check("fuel constant_g_s", *constant_g_s, 0.0, 100.0, "0 to 100 g/s")?;
             check("fuel per_rpm_g_s", *per_rpm_g_s, 0.0, 1.0, "0 to 1 g/s per rpm")?;
             check("fuel per_kw_g_s", *per_kw_g_s, 1e-6, 1.0, "positive, up to 1 g/s per kW")
         }
-        FuelModel::Map { bsfc_g_kwh: b, zero_torque_g_s } => {
+        FuelModel::Map { flow_g_s: f, friction_nm, low_load } => {
+            check_low_load(low_load)?;
             let axis = |a: &[f64]| {
                 !a.is_empty()
                     && a.iter().all(|v| v.is_finite())
                     && a.windows(2).all(|w| w[1] > w[0])
             };
-            if !axis(b.x()) || !axis(b.y()) || b.z().len() != b.x().len() * b.y().len() {
+            let from_zero = axis(f.x()) && axis(f.y()) && f.x()[0] > 0.0 && f.y()[0] == 0.0;
+            if !from_zero || f.z().len() != f.x().len() * f.y().len() {
                 return Err(PccError::BadShape {
-                    quantity: "fuel bsfc_g_kwh".into(),
-                    why: "axes must increase and span the values".into(),
+                    quantity: "fuel flow_g_s".into(),
+                    why: "axes must increase, from zero torque, and span the values".into(),
                 });
             }
-            for (i, &z) in b.z().iter().enumerate() {
-                check(&format!("fuel bsfc_g_kwh[{i}]"), z, 1.0, 1e5, "1 to 1e5 g/kWh")?;
+            for (i, &z) in f.z().iter().enumerate() {
+                check(&format!("fuel flow_g_s[{i}]"), z, 0.0, 1e3, "0 to 1000 g/s")?;
             }
-            check_curve("fuel zero_torque_g_s", zero_torque_g_s, 0.0, 100.0)
+            check_curve("fuel friction_nm", friction_nm, 0.0, 1e5)
         }
     }
+}
+
+fn check_low_load(l: &LowLoadFuel) -> Result<(), PccError> {
+    check("fuel low_load extra_frac", l.extra_frac, -0.9, 10.0, "-0.9 to 10")?;
+    check("fuel low_load fades_out_kw", l.fades_out_kw, 0.1, 1e4, "0.1 to 10000 kW")
 }

@@ -2,7 +2,7 @@
 
 use planner::pcc::model::profile_of;
 use road::ProfilePoint;
-use tractrix_core::{Curve, FuelModel, Grid, RPM_PER_RAD_S};
+use tractrix_core::{Curve, FuelModel, Grid, LowLoadFuel, RPM_PER_RAD_S};
 
 /// Length of the synthetic roads, m.
 pub(crate) const LENGTH_M: f64 = 15_000.0;
@@ -90,26 +90,23 @@ pub(crate) fn roads() -> Vec<(&'static str, Vec<ProfilePoint>)> {
     ]
 }
 
-/// Fuel map of another engine as a test bench tells it: consumption over speed and torque. Losses
-/// grow toward both ends of the speed range and with the load, so that the best point lies at middle
-/// speed and three quarters of full load; flow at a given speed is convex in torque. The torque steps
-/// are fine, because bilinear consumption between coarse ones is not convex: an optimum then jumps
-/// between the grid's torques.
+/// Fuel map of another engine as a test bench tells it: flow over speed and torque. Losses grow
+/// toward both ends of the speed range and with the load, so that the best point lies at middle
+/// speed and three quarters of full load; flow at a given speed is convex in torque. Its friction is
+/// that of the reference truck.
 #[allow(dead_code, clippy::expect_used)]
 pub(crate) fn bench_map() -> FuelModel {
     let rad_s: Vec<f64> = (0..13).map(|i| (600.0 + 125.0 * f64::from(i)) / RPM_PER_RAD_S).collect();
-    let torque_nm: Vec<f64> = (0..110).map(|i| 20.0 + 24.0 * f64::from(i)).collect();
+    let torque_nm: Vec<f64> = (0..110).map(|i| 24.0 * f64::from(i)).collect();
     let flow = |w: f64, t: f64| {
         let lost = 120.0 + 0.09 * w * RPM_PER_RAD_S + 100.0 * (w / 120.0 - 1.0).powi(2);
         0.0485e-3 * w * (t + lost + 60.0 * (t / 1300.0).powi(2))
     };
-    let bsfc = rad_s
-        .iter()
-        .flat_map(|&w| torque_nm.iter().map(move |&t| flow(w, t) * 3.6e6 / (t * w)))
-        .collect();
-    let zero = rad_s.iter().map(|&w| flow(w, 0.0)).collect();
+    let g_s = rad_s.iter().flat_map(|&w| torque_nm.iter().map(move |&t| flow(w, t))).collect();
+    let friction_nm = rad_s.iter().map(|w| 95.0 + 0.085 * w * RPM_PER_RAD_S).collect();
     FuelModel::Map {
-        bsfc_g_kwh: Grid::new("bsfc", rad_s.clone(), torque_nm, bsfc).expect("increasing axes"),
-        zero_torque_g_s: Curve::new("zero torque", rad_s, zero).expect("an increasing axis"),
+        flow_g_s: Grid::new("flow", rad_s.clone(), torque_nm, g_s).expect("increasing axes"),
+        friction_nm: Curve::new("friction", rad_s, friction_nm).expect("an increasing axis"),
+        low_load: LowLoadFuel::default(),
     }
 }

@@ -190,7 +190,7 @@ impl<'a> Plant<'a> {
         let gas_nm = net + at.friction_nm + self.aux_w / w;
         let injects = need >= 1e-7 && gas_nm >= 1e-6;
         let charged_g = if injects || self.task.charge_cut {
-            time_s * self.fuel.rate_g_s(w, gas_nm.max(1e-6), at.friction_nm)
+            time_s * self.fuel.rate_g_s(w, gas_nm.max(1e-6))
         } else {
             0.0
         };
