@@ -14,6 +14,18 @@ pub enum CoreError {
         /// The value found.
         value: f64,
     },
+    /// A number is outside the range that can be planned with.
+    #[error("{field} = {value} is outside {low} to {high}")]
+    OutOfRange {
+        /// Key with unit, and index where it is an element.
+        field: String,
+        /// The value found.
+        value: f64,
+        /// Lowest allowed value.
+        low: f64,
+        /// Highest allowed value.
+        high: f64,
+    },
     /// A table's abscissa does not increase strictly, or its sizes do not match.
     #[error("table {name}: {why}")]
     BadTable {

@@ -17,6 +17,7 @@ mod ego;
 mod error;
 mod fuel;
 mod limits;
+mod limits_check;
 mod plan;
 mod provenance;
 mod scene;

@@ -2,19 +2,14 @@
 //! `cargo bench -p planner --bench pcc`
 #![allow(missing_docs, clippy::unwrap_used)]
 
-#[allow(dead_code)]
-#[path = "../tests/support/pcc/corpus.rs"]
-mod corpus;
-#[path = "../tests/support/data_sheet.rs"]
-mod data_sheet;
-#[path = "../tests/support/pcc/replan.rs"]
-mod replan;
+#[path = "../tests/support/pcc/mod.rs"]
+mod support;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use planner::pcc::solve::{Clarabel, DefaultSolver, Solution, Structured, Subproblem, clarabel};
 use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
-use planner::pcc::{SpeedBand, Tuning};
 use std::hint::black_box;
+use support::{BANDS_KM_H, Engine, MASSES_KG, corpus, replan, request, truck};
 
 const ROADS: [&str; 3] = ["rolling2", "hilly5", "test_site"];
 
@@ -23,17 +18,9 @@ fn each_trip(mut run: impl FnMut(&str, &TripRequest<'_>)) {
         if !ROADS.contains(&name) {
             continue;
         }
-        for mass in [19_000.0, 55_000.0] {
-            let mut limits = data_sheet::reference_limits();
-            limits.road_load.mass_kg = mass;
-            let request = TripRequest {
-                profile: &profile,
-                truck: &limits,
-                band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
-                trip_time_s: None,
-                eco_roll: false,
-                tuning: Tuning::default(),
-            };
+        for mass in MASSES_KG {
+            let limits = truck(mass, Engine::Willans);
+            let request = request(&profile, &limits, BANDS_KM_H[1]);
             run(&format!("{name}_{:.0}t", mass / 1e3), &request);
         }
     }

@@ -4,21 +4,16 @@
 //! `cargo run --release -p planner --example pcc_programmes > programmes.jsonl`
 #![allow(clippy::disallowed_macros, clippy::disallowed_methods, clippy::unwrap_used)]
 
-#[allow(dead_code)]
-#[path = "../tests/support/pcc/corpus.rs"]
-mod corpus;
-#[path = "../tests/support/data_sheet.rs"]
-mod data_sheet;
-#[path = "../tests/support/pcc/replan.rs"]
-mod replan;
+#[path = "../tests/support/pcc/mod.rs"]
+mod support;
 
 use planner::pcc::solve::{
     Programme, Solution, Structured, Subproblem, Terminal, TimeRule, clarabel,
 };
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::{SpeedBand, Tuning};
+use planner::pcc::trip::Trip;
 use rustix::time::{ClockId, clock_gettime};
 use serde_json::{Value, json};
+use support::{BANDS_KM_H, Engine, corpus, replan, request, truck};
 
 const RUNS: usize = 9;
 
@@ -63,15 +58,8 @@ fn main() {
         if !["rolling2", "hilly5", "test_site"].contains(&name) {
             continue;
         }
-        let limits = data_sheet::reference_limits();
-        let request = TripRequest {
-            profile: &profile,
-            truck: &limits,
-            band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
-            trip_time_s: None,
-            eco_roll: false,
-            tuning: Tuning::default(),
-        };
+        let limits = truck(55_000.0, Engine::Willans);
+        let request = request(&profile, &limits, BANDS_KM_H[1]);
         let trip = Trip::new(&request).unwrap();
         let end_e = *trip.cruise.e_j_kg.last().unwrap();
         let mut last = None;

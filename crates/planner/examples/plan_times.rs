@@ -6,21 +6,16 @@
 //! subproblems, linearisation, driving and bounds included.
 #![allow(clippy::disallowed_macros, clippy::disallowed_methods, clippy::unwrap_used)]
 
-#[allow(dead_code)]
-#[path = "../tests/support/pcc/corpus.rs"]
-mod corpus;
-#[path = "../tests/support/data_sheet.rs"]
-mod data_sheet;
-#[path = "../tests/support/pcc/replan.rs"]
-mod replan;
+#[path = "../tests/support/pcc/mod.rs"]
+mod support;
 
 use planner::pcc::solve::{
     Clarabel, DefaultSolver, Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule,
     clarabel,
 };
-use planner::pcc::trip::{Trip, TripRequest, plan_trip_with};
-use planner::pcc::{SpeedBand, Tuning};
+use planner::pcc::trip::{Trip, plan_trip_with};
 use rustix::time::{ClockId, clock_gettime};
+use support::{BANDS_KM_H, Engine, MASSES_KG, corpus, replan, request, truck};
 
 fn now_ms() -> f64 {
     let t = clock_gettime(ClockId::ThreadCPUTime);
@@ -63,17 +58,9 @@ fn main() {
         if only.as_ref().is_some_and(|o| !name.contains(o.as_str())) {
             continue;
         }
-        for mass in [19_000.0, 55_000.0] {
-            let mut limits = data_sheet::reference_limits();
-            limits.road_load.mass_kg = mass;
-            let request = TripRequest {
-                profile: &profile,
-                truck: &limits,
-                band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
-                trip_time_s: None,
-                eco_roll: false,
-                tuning: Tuning::default(),
-            };
+        for mass in MASSES_KG {
+            let limits = truck(mass, Engine::Willans);
+            let request = request(&profile, &limits, BANDS_KM_H[1]);
             let mut solver = DefaultSolver::default();
             let mut default = |a: &Subproblem, b: Terminal, c: TimeRule, d: Option<&[f64]>| {
                 solver.solve(a, b, c, d)

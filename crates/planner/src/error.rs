@@ -2,6 +2,7 @@
 //! values ([`tractrix_core::LaneChangeRefusal`], [`tractrix_core::PlanStatus`]), not errors.
 
 use alloc::string::String;
+use tractrix_core::CoreError;
 
 /// Errors of this crate, all raised while something is being built or loaded.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -19,31 +20,9 @@ pub enum PlannerError {
         /// Highest allowed value.
         high: f64,
     },
-    /// A value of the vehicle limits cannot be planned with.
-    #[error("vehicle limits: {field} = {value} is outside {low} to {high}")]
-    Limits {
-        /// Field with unit.
-        field: &'static str,
-        /// The value found.
-        value: f64,
-        /// Lowest allowed value.
-        low: f64,
-        /// Highest allowed value.
-        high: f64,
-    },
-    /// The vehicle limits list no gear, or gear lists of different lengths.
-    #[error(
-        "vehicle limits: {ratios} gear ratios, {efficiencies} gear efficiencies, \
-         {rotating_masses} rotating masses"
-    )]
-    Gears {
-        /// Number of gear ratios.
-        ratios: usize,
-        /// Number of efficiencies.
-        efficiencies: usize,
-        /// Number of rotating masses.
-        rotating_masses: usize,
-    },
+    /// The vehicle limits cannot be planned with.
+    #[error("vehicle limits: {0}")]
+    Limits(#[from] CoreError),
     /// The lateral controller has no stabilising gain for this handling data.
     #[error(
         "lateral controller: no stabilising gain at {speed_m_s} m/s with {trailer_mass_kg} kg of trailer"

@@ -3,11 +3,12 @@
 
 mod support;
 
+use planner::pcc::{SpeedBand, TripRequest, Tuning, plan_trip};
 use planner::{SpeedPlannerKind, SpeedProfile, Stack, StackConfig, drive_tick};
 use road::builtin;
 use support::data_sheet::reference_limits;
 use support::{Plant, no_traffic};
-use tractrix_core::{PlanStatus, SpeedPoint, Time};
+use tractrix_core::{PlanStatus, SpeedPoint, Time, VehicleLimits};
 
 fn tick(i: i64) -> Time {
     Time(i * 10_000_000)
@@ -75,4 +76,44 @@ fn a_planned_profile_is_driven_and_where_it_ends_cruise_takes_over() {
     }
     assert_eq!(stack.plan().speed_status, PlanStatus::Fallback);
     assert!((plant.ego.speed_m_s - 20.0).abs() < 0.05);
+}
+
+/// Two tables checked a truck's limits, one for the stack and one for the speed planner, and drew
+/// eight ranges differently: a mass of 300 t or a wheel of 2.5 m was planned with and not driven.
+#[test]
+fn stack_and_speed_planner_refuse_the_same_limits_in_the_same_words() {
+    let profile = [0.0, 500.0, 1000.0].map(|s_m| road::ProfilePoint {
+        s_m,
+        speed_limit_m_s: 25.0,
+        ..road::ProfilePoint::default()
+    });
+    let spoils: [(&str, fn(&mut VehicleLimits)); 9] = [
+        ("road_load.mass_kg = 300000", |l| l.road_load.mass_kg = 3e5),
+        ("road_load.rolling_coeff = 0.15", |l| l.road_load.rolling_coeff = 0.15),
+        ("powertrain.wheel_radius_m = 2.5", |l| l.powertrain.wheel_radius_m = 2.5),
+        ("powertrain.idle_speed_rad_s = 600", |l| l.powertrain.idle_speed_rad_s = 600.0),
+        ("powertrain.max_speed_rad_s = 70", |l| l.powertrain.max_speed_rad_s = 70.0),
+        ("powertrain.gear_ratios[3] = 0.05", |l| l.powertrain.gear_ratios[3] = 0.05),
+        ("powertrain.gear_efficiency_frac[0] = 0.2", |l| {
+            l.powertrain.gear_efficiency_frac[0] = 0.2;
+        }),
+        ("brakes.max_decel_m_s2 = NaN", |l| l.brakes.max_decel_m_s2 = f64::NAN),
+        ("1 to 32", |l| l.powertrain.rotating_mass_kg.truncate(3)),
+    ];
+    for (said, spoil) in spoils {
+        let mut limits = reference_limits();
+        spoil(&mut limits);
+        let of_stack = Stack::new(StackConfig::default(), &limits).unwrap_err().to_string();
+        let request = TripRequest {
+            profile: &profile,
+            truck: &limits,
+            band: SpeedBand { set_m_s: 20.0, min_m_s: 18.0, max_m_s: 22.0 },
+            trip_time_s: None,
+            eco_roll: false,
+            tuning: Tuning::default(),
+        };
+        let of_trip = plan_trip(&request).unwrap_err().to_string();
+        assert_eq!(of_stack, of_trip);
+        assert!(of_stack.starts_with("vehicle limits: ") && of_stack.contains(said), "{of_stack}");
+    }
 }

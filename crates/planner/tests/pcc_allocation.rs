@@ -1,11 +1,8 @@
 //! The structured solver asks for memory only while its workspace grows.
 #![expect(unsafe_code, reason = "an allocator cannot be written without")]
 
-#[allow(dead_code)]
-#[path = "support/pcc/corpus.rs"]
-mod corpus;
-#[path = "support/data_sheet.rs"]
-mod data_sheet;
+#[path = "support/pcc/mod.rs"]
+mod support;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -14,8 +11,8 @@ use planner::pcc::model::drive_profile;
 use planner::pcc::solve::{
     CutModel, Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule,
 };
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::{SpeedBand, Tuning};
+use planner::pcc::trip::Trip;
+use support::{BANDS_KM_H, Engine, corpus, request, truck};
 
 thread_local! {
     static REQUESTS: Cell<usize> = const { Cell::new(0) };
@@ -46,15 +43,8 @@ fn requests_of(run: impl FnOnce()) -> usize {
 #[test]
 fn after_the_first_solve_neither_linearisation_nor_solution_allocates() {
     let (_, profile) = corpus::roads().swap_remove(4);
-    let limits = data_sheet::reference_limits();
-    let request = TripRequest {
-        profile: &profile,
-        truck: &limits,
-        band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
-        trip_time_s: None,
-        eco_roll: false,
-        tuning: Tuning::default(),
-    };
+    let limits = truck(55_000.0, Engine::Willans);
+    let request = request(&profile, &limits, BANDS_KM_H[1]);
     let trip = Trip::new(&request).unwrap();
     let (truck, course, gears) = (&trip.truck, &trip.course, &trip.cruise.drive);
     // Another profile, so that the second solve is another problem than the first.

@@ -2,17 +2,14 @@
 
 #![allow(clippy::disallowed_macros)]
 
-#[allow(dead_code)]
-#[path = "support/pcc/corpus.rs"]
-mod corpus;
-#[path = "support/data_sheet.rs"]
-mod data_sheet;
+#[path = "support/pcc/mod.rs"]
+mod support;
 
 use planner::pcc::solve::{
     Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule, clarabel,
 };
-use planner::pcc::trip::{Trip, TripRequest};
-use planner::pcc::{SpeedBand, Tuning};
+use planner::pcc::trip::Trip;
+use support::{BANDS_KM_H, Engine, MASSES_KG, corpus, request, truck};
 
 /// The subproblem's objective at a solution, g.
 fn cost(sub: &Subproblem, end: Terminal, time: TimeRule, x: &Solution) -> f64 {
@@ -44,17 +41,9 @@ fn the_structured_solver_matches_clarabel_on_the_whole_corpus() {
     let mut compared = 0;
     let mut fast = Structured::default();
     for (name, profile) in corpus::roads() {
-        for mass in [19_000.0, 55_000.0] {
-            let mut limits = data_sheet::reference_limits();
-            limits.road_load.mass_kg = mass;
-            let request = TripRequest {
-                profile: &profile,
-                truck: &limits,
-                band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
-                trip_time_s: None,
-                eco_roll: false,
-                tuning: Tuning::default(),
-            };
+        for mass in MASSES_KG {
+            let limits = truck(mass, Engine::Willans);
+            let request = request(&profile, &limits, BANDS_KM_H[1]);
             let trip = Trip::new(&request).unwrap();
             let (mut worst, mut seen) = (0.0f64, 0);
             let mut judge = |sub: &Subproblem, end: Terminal, time: TimeRule, _: Option<&[f64]>| {
@@ -110,15 +99,8 @@ fn campaign_the_difference_to_clarabel_shrinks_with_clarabels_tolerance() {
     let mut worst = [(0.0f64, 0.0f64); 5];
     let mut fast = Structured::default();
     for (_, profile) in corpus::roads() {
-        let limits = data_sheet::reference_limits();
-        let request = TripRequest {
-            profile: &profile,
-            truck: &limits,
-            band: SpeedBand { set_m_s: 20.0, min_m_s: 60.0 / 3.6, max_m_s: 85.0 / 3.6 },
-            trip_time_s: None,
-            eco_roll: false,
-            tuning: Tuning::default(),
-        };
+        let limits = truck(55_000.0, Engine::Willans);
+        let request = request(&profile, &limits, BANDS_KM_H[1]);
         let trip = Trip::new(&request).unwrap();
         let mut seen = 0;
         let mut judge = |sub: &Subproblem, end: Terminal, time: TimeRule, _: Option<&[f64]>| {

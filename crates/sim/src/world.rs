@@ -6,7 +6,7 @@ use std::sync::Arc;
 use dynamics::{TruckModel, TruckParameters};
 use planner::{RatesConfig, Stack, StackConfig};
 use road::Road;
-use tractrix_core::{EgoState, Geometry, Plan, Recorder, Tick, Time, Vehicle};
+use tractrix_core::{Geometry, Recorder, Tick, Time, Vehicle};
 
 use crate::{Metrics, Scenario, SimError, SimTruck, Summary, Traffic};
 
@@ -39,19 +39,16 @@ pub struct World {
     sensors: bool,
 }
 
-/// Measures a tick. Where sensors change the scene, the tick is kept and measured with the scene as
-/// it is: what a truck does not see it can still hit.
+/// Measures a tick, unless sensors change the scene: then [`World::tick`] measures it with the scene
+/// as it is, because what a truck does not see it can still hit.
 struct Judge<'a> {
     metrics: &'a mut Metrics,
-    unseen: Option<(EgoState, Plan)>,
     sensors: bool,
 }
 
 impl Recorder for Judge<'_> {
     fn record(&mut self, tick: &Tick<'_>) {
-        if self.sensors {
-            self.unseen = Some((*tick.ego, tick.plan.clone()));
-        } else {
+        if !self.sensors {
             self.metrics.record(tick);
         }
     }
@@ -140,8 +137,8 @@ impl World {
         if self.status != Status::Running {
             return Ok(self.status);
         }
-        let mut judge = Judge { metrics: &mut self.metrics, unseen: None, sensors: self.sensors };
-        planner::drive_tick(
+        let mut judge = Judge { metrics: &mut self.metrics, sensors: self.sensors };
+        let outcome = planner::drive_tick(
             self.now,
             &mut self.truck,
             &mut self.traffic,
@@ -150,8 +147,9 @@ impl World {
             &mut (&mut judge, recorder),
         )
         .map_err(SimError::from)?;
-        if let (Some((ego, plan)), Some(scene)) = (judge.unseen, self.traffic.truth()) {
-            self.metrics.record(&Tick { now: self.now, ego: &ego, scene, plan: &plan });
+        if let (true, Some(scene)) = (self.sensors, self.traffic.truth()) {
+            let (ego, plan) = (&outcome.ego.value, self.stack.plan());
+            self.metrics.record(&Tick { now: self.now, ego, scene, plan });
         }
         self.now = self.now.plus_nanos(self.tick_ns);
         let front_m = self.truck.state().s_m + self.truck.limits().geometry.front_m;

@@ -2,11 +2,16 @@
 
 use alloc::string::String;
 
+use tractrix_core::CoreError;
+
 /// A request that cannot be planned. Outcomes of a valid request (solver limits, unreachable trip
 /// time) are values: see [`super::TripStatus`].
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PccError {
+    /// The truck reports something that cannot be planned with.
+    #[error("vehicle limits: {0}")]
+    Limits(#[from] CoreError),
     /// A quantity is not finite or outside what the planner accepts.
     #[error("{quantity} = {value} is not accepted: {why}")]
     BadValue {

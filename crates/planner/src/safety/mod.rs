@@ -2,7 +2,6 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `limits_check` | a vehicle's limits can be planned with |
 //! | `surroundings` | who is ahead, behind and alongside in a lane |
 //! | `rss` | safe gaps (responsibility-sensitive safety) |
 //! | `gate` | whether a lane change stays outside everyone's safe gap |
@@ -10,7 +9,6 @@
 
 mod gate;
 mod guard;
-mod limits_check;
 mod rss;
 mod surroundings;
 
@@ -18,6 +16,5 @@ pub use gate::Gate;
 pub(crate) use gate::{SpeedCourse, Strictness};
 pub use guard::GuardConfig;
 pub(crate) use guard::{GuardInput, GuardMemory, Headway, inspect, limit};
-pub(crate) use limits_check::check_limits;
 pub use rss::{RearResponse, RssConfig, SafeGap};
 pub(crate) use surroundings::{EgoExtent, ahead, behind, in_lane, reaches};

@@ -18,7 +18,7 @@ use alloc::sync::Arc;
 use crate::decider::observation::Observer;
 use crate::decider::{DeciderKind, LaneChoice, Policy};
 use crate::pcc::horizon::{HorizonFailure, HorizonPlan};
-use crate::safety::{GuardInput, GuardMemory, Headway, check_limits, inspect, limit};
+use crate::safety::{GuardInput, GuardMemory, Headway, inspect, limit};
 use crate::speed::{
     LeadView, LoadEstimate, LoadEstimator, LongitudinalController, ReferenceSpeed, leads,
 };
@@ -83,7 +83,7 @@ impl Stack {
         policy: Option<Arc<Policy>>,
     ) -> Result<Self, PlannerError> {
         config.check()?;
-        check_limits(limits)?;
+        limits.check()?;
         let rates = &config.rates;
         Ok(Self {
             lateral: LateralController::new(config.lateral, limits, rates.control_s())?,

@@ -16,12 +16,12 @@
 //! Left out: wind, tyre warm-up, torque build-up, and the traction gap of a shift, which is charged
 //! as a fixed amount of fuel per shift.
 
-use alloc::{format, vec::Vec};
+use alloc::vec::Vec;
 
-use tractrix_core::{Curve, FuelModel, GRAVITY_M_S2, LowLoadFuel, VehicleLimits};
+use tractrix_core::{FuelModel, GRAVITY_M_S2, VehicleLimits};
 
 use super::engine::TorqueCurves;
-use crate::pcc::error::{PccError, check};
+use crate::pcc::error::PccError;
 
 /// Lowest engine speed under load, as a multiple of idle speed. Automated gearboxes shift down
 /// before; 1.25 × 600 rpm = 750 rpm is 52 km/h in a direct top gear.
@@ -73,66 +73,10 @@ impl Truck {
     /// The model from what the truck reports.
     ///
     /// # Errors
-    /// [`PccError`] names the first quantity that is not usable.
+    /// [`PccError::Limits`] names the first quantity that is not usable.
     pub fn new(limits: &VehicleLimits) -> Result<Self, PccError> {
-        let p = &limits.powertrain;
-        let load = &limits.road_load;
-        let n = p.gear_ratios.len();
-        if n == 0 || n > 32 {
-            return Err(PccError::BadShape {
-                quantity: "gear_ratios".into(),
-                why: format!("{n} gears, 1 to 32 needed"),
-            });
-        }
-        for (name, len) in [
-            ("gear_efficiency_frac", p.gear_efficiency_frac.len()),
-            ("rotating_mass_kg", p.rotating_mass_kg.len()),
-        ] {
-            if len != n {
-                return Err(PccError::BadShape {
-                    quantity: name.into(),
-                    why: format!("{len} values for {n} gears"),
-                });
-            }
-        }
-        check("mass_kg", load.mass_kg, 500.0, 500_000.0, "500 to 500000 kg")?;
-        check("cd_a_m2", load.cd_a_m2, 0.0, 50.0, "0 to 50 m2")?;
-        check("air_density_kg_m3", load.air_density_kg_m3, 0.0, 3.0, "0 to 3 kg/m3")?;
-        check("rolling_coeff", load.rolling_coeff, 0.0, 0.2, "0 to 0.2")?;
-        check("final_drive_ratio", p.final_drive_ratio, 0.1, 50.0, "0.1 to 50")?;
-        check("wheel_radius_m", p.wheel_radius_m, 0.1, 3.0, "0.1 to 3 m")?;
-        check("auxiliary_power_w", p.auxiliary_power_w, 0.0, 1e6, "0 to 1e6 W")?;
-        check("idle_speed_rad_s", p.idle_speed_rad_s, 1.0, 1000.0, "1 to 1000 rad/s")?;
-        check(
-            "max_speed_rad_s",
-            p.max_speed_rad_s,
-            p.idle_speed_rad_s * LUGGING_FACTOR,
-            5000.0,
-            "above 1.25 times the idle speed",
-        )?;
-        check("idle_fuel_g_s", p.idle_fuel_g_s, 0.0, 100.0, "0 to 100 g/s")?;
-        check("rotating_mass_neutral_kg", p.rotating_mass_neutral_kg, 0.0, 1e6, "0 to 1e6 kg")?;
-        check("max_decel_m_s2", limits.brakes.max_decel_m_s2, 0.1, 20.0, "0.1 to 20 m/s2")?;
-        for (i, &r) in p.gear_ratios.iter().enumerate() {
-            check(&format!("gear_ratios[{i}]"), r, 1e-3, 1e3, "positive")?;
-            check(
-                &format!("gear_efficiency_frac[{i}]"),
-                p.gear_efficiency_frac[i],
-                0.3,
-                1.0,
-                "0.3 to 1",
-            )?;
-            check(
-                &format!("rotating_mass_kg[{i}]"),
-                p.rotating_mass_kg[i],
-                0.0,
-                1e6,
-                "0 to 1e6 kg",
-            )?;
-        }
-        check_curve("full_load_nm", &p.full_load_nm, 0.0, 1e5)?;
-        check_curve("friction_nm", &p.friction_nm, 0.0, 1e5)?;
-        check_fuel(&p.fuel)?;
+        limits.check()?;
+        let (p, load) = (&limits.powertrain, &limits.road_load);
         let to_engine = p.final_drive_ratio / p.wheel_radius_m;
         let m = load.mass_kg;
         let inertia = |rotating: f64| (m + rotating) / m;
@@ -343,56 +287,4 @@ impl Operating<'_> {
         let torque = self.indicated_nm(p_m_s2).max(1e-6);
         self.truck.fuel.rate_g_s(self.speed_rad_s, torque)
     }
-}
-
-fn check_curve(name: &str, c: &Curve, low: f64, high: f64) -> Result<(), PccError> {
-    let ok = !c.x().is_empty()
-        && c.x().len() == c.y().len()
-        && c.x().iter().all(|x| x.is_finite())
-        && c.x().windows(2).all(|w| w[1] > w[0]);
-    if !ok {
-        return Err(PccError::BadShape {
-            quantity: name.into(),
-            why: "abscissae must be finite, increasing and as many as ordinates".into(),
-        });
-    }
-    for (i, &y) in c.y().iter().enumerate() {
-        check(&format!("{name}[{i}]"), y, low, high, "finite and not negative")?;
-    }
-    Ok(())
-}
-
-fn check_fuel(fuel: &FuelModel) -> Result<(), PccError> {
-    match fuel {
-        FuelModel::Willans { constant_g_s, per_rpm_g_s, per_kw_g_s, low_load } => {
-            check_low_load(low_load)?;
-            check("fuel constant_g_s", *constant_g_s, 0.0, 100.0, "0 to 100 g/s")?;
-            check("fuel per_rpm_g_s", *per_rpm_g_s, 0.0, 1.0, "0 to 1 g/s per rpm")?;
-            check("fuel per_kw_g_s", *per_kw_g_s, 1e-6, 1.0, "positive, up to 1 g/s per kW")
-        }
-        FuelModel::Map { flow_g_s: f, friction_nm, low_load } => {
-            check_low_load(low_load)?;
-            let axis = |a: &[f64]| {
-                !a.is_empty()
-                    && a.iter().all(|v| v.is_finite())
-                    && a.windows(2).all(|w| w[1] > w[0])
-            };
-            let from_zero = axis(f.x()) && axis(f.y()) && f.x()[0] > 0.0 && f.y()[0] == 0.0;
-            if !from_zero || f.z().len() != f.x().len() * f.y().len() {
-                return Err(PccError::BadShape {
-                    quantity: "fuel flow_g_s".into(),
-                    why: "axes must increase, from zero torque, and span the values".into(),
-                });
-            }
-            for (i, &z) in f.z().iter().enumerate() {
-                check(&format!("fuel flow_g_s[{i}]"), z, 0.0, 1e3, "0 to 1000 g/s")?;
-            }
-            check_curve("fuel friction_nm", friction_nm, 0.0, 1e5)
-        }
-    }
-}
-
-fn check_low_load(l: &LowLoadFuel) -> Result<(), PccError> {
-    check("fuel low_load extra_frac", l.extra_frac, -0.9, 10.0, "-0.9 to 10")?;
-    check("fuel low_load fades_out_kw", l.fades_out_kw, 0.1, 1e4, "0.1 to 10000 kW")
 }
