@@ -60,6 +60,13 @@ impl Idm {
         }
     }
 
+    /// The same driver while he puts up with a part of his standstill gap and headway.
+    #[inline]
+    #[must_use]
+    pub fn content_with(self, frac: f64) -> Self {
+        Self { headway_s: frac * self.headway_s, min_gap_m: frac * self.min_gap_m, ..self }
+    }
+
     /// Acceleration on a free road, m/s², with the desired speed capped by `limit_m_s`. A limit of
     /// zero asks for a stop with the comfortable deceleration.
     #[inline]
@@ -109,6 +116,15 @@ impl Idm {
         a.max(-self.max_decel_m_s2)
     }
 
+    /// Free acceleration and what a leader takes away together, as in IDM+ (Schakel, van Arem,
+    /// Netten, IEEE ITSC 2010, Eq. 4): `a min[1 - (v/v0)^4, 1 - (s*/s)^2]`, m/s². Followers keep the
+    /// headway T at every speed, where the sum of both terms keeps the more the nearer v is to v0.
+    #[inline]
+    #[must_use]
+    pub fn lesser_m_s2(&self, free_m_s2: f64, interaction_m_s2: f64) -> f64 {
+        free_m_s2.min(self.accel_m_s2 + interaction_m_s2)
+    }
+
     /// Gap at which a driver follows a leader of the same steady speed, m (Eq. 11.19 of Treiber &
     /// Kesting): `(s0 + v T) / sqrt(1 - (v/v0)^4)`; infinite at or above v0.
     #[inline]
@@ -155,6 +171,16 @@ mod tests {
             assert!(a.abs() < 1e-12, "{v}: {a}");
         }
         assert!(d.equilibrium_gap_m(33.3).is_infinite());
+    }
+
+    #[test]
+    fn with_the_lesser_of_both_terms_the_headway_is_kept_up_to_the_desired_speed() {
+        let d = car();
+        for v in [5.0, 20.0, 33.0] {
+            let (free, gap) = (d.free_m_s2(v, 99.0), 2.0 + 1.6 * v);
+            assert!(d.lesser_m_s2(free, d.interaction_m_s2(v, gap, 0.0)).abs() < 1e-12);
+            assert_eq!(d.lesser_m_s2(free, d.interaction_m_s2(v, 1e4, 0.0)), free);
+        }
     }
 
     #[test]

@@ -22,6 +22,8 @@ pub(crate) enum Stream {
     Search = 6,
     /// Speed before the start of the road; index = period, number = lane track.
     Inflow = 7,
+    /// Errors of judgement; index = vehicle number, number = tick.
+    Judgement = 8,
 }
 
 const M0: u64 = 0xD251_1F53;
@@ -59,10 +61,17 @@ impl Draws {
 
     /// Uniform in [0, 1), 53 bits.
     pub(crate) fn uniform(&self, number: u32) -> f64 {
+        self.two(number)[0]
+    }
+
+    /// Two independent ones; the first is that of [`Draws::uniform`].
+    pub(crate) fn two(&self, number: u32) -> [f64; 2] {
         let (i0, i1) = (self.index as u32, (self.index >> 32) as u32);
-        let r = philox4x32_10([i0, i1, self.stream as u32, number], self.key);
-        let bits = (u64::from(r[0]) << 32 | u64::from(r[1])) >> 11;
-        bits as f64 * (1.0 / 9_007_199_254_740_992.0)
+        let [a, b, c, d] = philox4x32_10([i0, i1, self.stream as u32, number], self.key);
+        [(a, b), (c, d)].map(|(high, low)| {
+            let bits = (u64::from(high) << 32 | u64::from(low)) >> 11;
+            bits as f64 * (1.0 / 9_007_199_254_740_992.0)
+        })
     }
 
     /// Bell-shaped with mean 0, variance 1, bounded by ±3.464: a sum of four uniforms

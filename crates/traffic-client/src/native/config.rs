@@ -8,7 +8,12 @@
 use serde::{Deserialize, Serialize};
 use tractrix_core::VehicleClass;
 
+use super::human::HumanConfig;
 use crate::TrafficError;
+
+/// Relative standard deviation of headways among drivers: between drivers on the same motorway it is
+/// about half the mean (Treiber & Kesting 2013, Fig. 4.8; Banks, Transp. Res. C 11 (2003) 189).
+const HEADWAY_SIGMA_FRAC: f64 = 0.5;
 
 /// Means of one vehicle class; each driver draws their own values around them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -26,6 +31,9 @@ pub struct ClassConfig {
     pub speed_factor_sigma_frac: f64,
     /// IDM time headway, s.
     pub headway_s: f64,
+    /// Relative standard deviation of the headway among drivers (log-normal).
+    #[serde(default = "headway_sigma_frac")]
+    pub headway_sigma_frac: f64,
     /// IDM standstill gap, m.
     pub min_gap_m: f64,
     /// IDM acceleration, m/s².
@@ -34,7 +42,7 @@ pub struct ClassConfig {
     pub decel_m_s2: f64,
     /// Hardest braking, m/s².
     pub max_decel_m_s2: f64,
-    /// Relative standard deviation of headway, gap, acceleration and deceleration.
+    /// Relative standard deviation of standstill gap, acceleration and deceleration.
     pub spread_frac: f64,
     /// MOBIL politeness.
     pub politeness_frac: f64,
@@ -52,6 +60,11 @@ pub struct ClassConfig {
     pub rolling_coeff: f64,
     /// Air drag over mass: ρ c_d A / (2 m), 1/m.
     pub drag_1_m: f64,
+}
+
+/// Relative standard deviation of headways where a file does not name one.
+fn headway_sigma_frac() -> f64 {
+    HEADWAY_SIGMA_FRAC
 }
 
 /// Native traffic.
@@ -100,6 +113,8 @@ pub struct TrafficConfig {
     pub outflow_sigma_m_s: f64,
     /// Time between two independent draws of these speeds, s; in between they go over linearly.
     pub outflow_period_s: f64,
+    /// What drivers misjudge, get used to and remember.
+    pub human: HumanConfig,
     /// Passenger cars.
     pub car: ClassConfig,
     /// Light commercial vehicles.
@@ -109,9 +124,11 @@ pub struct TrafficConfig {
 }
 
 impl Default for TrafficConfig {
-    /// Medium density at 15 m/s. Driver parameters: Treiber & Kesting (2013), Table 11.2 (highway),
-    /// politeness and thresholds from Kesting, Treiber, Helbing (2007). Trucks: 40 t at 300 kW at
-    /// the wheels, c_d A = 6.3 m², rolling 0.0055 (VECTO generic long-haul tractor).
+    /// Medium density at 15 m/s. Headways and accelerations give a level two-lane road the capacity
+    /// of the HCM (6th ed., Exh. 12-4 and 12-25); standstill gaps are those of Treiber & Kesting
+    /// (2013), Table 11.2, politeness and thresholds those of Kesting, Treiber, Helbing (2007). Cars
+    /// use 25 W/kg of their power. Trucks: 40 t at 300 kW at the wheels, c_d A = 6.3 m², rolling
+    /// 0.0055 (VECTO generic long-haul tractor).
     fn default() -> Self {
         let car = ClassConfig {
             length_m: 4.6,
@@ -119,9 +136,10 @@ impl Default for TrafficConfig {
             width_m: 1.85,
             speed_factor_frac: 1.0,
             speed_factor_sigma_frac: 0.1,
-            headway_s: 1.4,
+            headway_s: 1.25,
+            headway_sigma_frac: HEADWAY_SIGMA_FRAC,
             min_gap_m: 2.0,
-            accel_m_s2: 1.4,
+            accel_m_s2: 2.0,
             decel_m_s2: 2.0,
             max_decel_m_s2: 8.0,
             spread_frac: 0.12,
@@ -130,7 +148,7 @@ impl Default for TrafficConfig {
             threshold_m_s2: 0.1,
             right_bias_m_s2: 0.1,
             lane_change_s: 4.0,
-            power_w_kg: 40.0,
+            power_w_kg: 25.0,
             rolling_coeff: 0.01,
             drag_1_m: 2.8e-4,
         };
@@ -138,9 +156,9 @@ impl Default for TrafficConfig {
             length_m: 6.5,
             length_spread_m: 1.0,
             width_m: 2.1,
-            headway_s: 1.5,
-            accel_m_s2: 1.2,
-            power_w_kg: 22.0,
+            headway_s: 1.35,
+            accel_m_s2: 1.7,
+            power_w_kg: 18.0,
             drag_1_m: 4.5e-4,
             ..car
         };
@@ -150,9 +168,9 @@ impl Default for TrafficConfig {
             width_m: 2.55,
             speed_factor_frac: 0.92,
             speed_factor_sigma_frac: 0.04,
-            headway_s: 1.8,
+            headway_s: 1.7,
             min_gap_m: 3.0,
-            accel_m_s2: 0.8,
+            accel_m_s2: 1.2,
             decel_m_s2: 1.5,
             max_decel_m_s2: 6.0,
             safe_decel_m_s2: 2.5,
@@ -184,6 +202,7 @@ impl Default for TrafficConfig {
             outflow_speed_m_s: None,
             outflow_sigma_m_s: 0.0,
             outflow_period_s: 20.0,
+            human: HumanConfig::default(),
             car,
             van,
             truck,
@@ -289,6 +308,9 @@ impl TrafficConfig {
         ] {
             check(key.to_owned(), value, low, high);
         }
+        for (key, value, low, high) in self.human.ranges() {
+            check(key.to_owned(), value, low, high);
+        }
         for (name, c) in [("car", &self.car), ("van", &self.van), ("truck", &self.truck)] {
             for (key, value, low, high) in [
                 ("length_m", c.length_m, 1.0, 40.0),
@@ -302,6 +324,7 @@ impl TrafficConfig {
                     0.25 * c.speed_factor_frac,
                 ),
                 ("headway_s", c.headway_s, 0.3, 10.0),
+                ("headway_sigma_frac", c.headway_sigma_frac, 0.0, 1.0),
                 ("min_gap_m", c.min_gap_m, 0.5, 20.0),
                 ("accel_m_s2", c.accel_m_s2, 0.1, 6.0),
                 ("decel_m_s2", c.decel_m_s2, 0.3, 6.0),

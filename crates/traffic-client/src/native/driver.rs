@@ -25,6 +25,15 @@ pub(crate) struct Driver {
     pub(crate) class: VehicleClass,
 }
 
+/// Nobody follows closer than this of their own will, s.
+const LEAST_HEADWAY_S: f64 = 0.4;
+
+/// Log-normal with mean 1 and this standard deviation, of a draw with mean 0 and variance 1.
+fn log_normal(sigma: f64, draw: f64) -> f64 {
+    let variance = libm::log1p(sigma * sigma);
+    libm::exp(libm::sqrt(variance) * draw - 0.5 * variance)
+}
+
 impl Driver {
     /// The driver of vehicle number `index`: the same for the same seed, whoever asks and when.
     /// `exits` are the off-ramps ahead, nearest first.
@@ -56,6 +65,7 @@ impl Driver {
         let c = config.class(class);
         // Bounded by construction: bell() within ±3.47 and spread_frac at most 0.25.
         let about = |mean: f64, number: u32| mean * (1.0 + c.spread_frac * d.bell(number));
+        let headway_s = c.headway_s * log_normal(c.headway_sigma_frac, d.bell(2));
         let factor = c.speed_factor_frac + c.speed_factor_sigma_frac * d.bell(1);
         let exit = exits
             .enumerate()
@@ -64,7 +74,7 @@ impl Driver {
         Self {
             idm: Idm::new(
                 config.max_speed_m_s * factor,
-                about(c.headway_s, 2),
+                headway_s.max(LEAST_HEADWAY_S),
                 about(c.min_gap_m, 3),
                 about(c.accel_m_s2, 4),
                 about(c.decel_m_s2, 5),

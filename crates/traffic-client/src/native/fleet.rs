@@ -4,6 +4,7 @@
 //! memory copies and no allocation.
 
 use super::driver::Driver;
+use super::human::Mind;
 use super::lanes::NO_LANE;
 
 /// All vehicles, one array per quantity, the vehicle furthest back first.
@@ -26,6 +27,8 @@ pub(crate) struct Fleet {
     pub(crate) id: Vec<u64>,
     /// Driver and vehicle.
     pub(crate) driver: Vec<Driver>,
+    /// What changes in the driver.
+    pub(crate) mind: Vec<Mind>,
 }
 
 impl Clone for Fleet {
@@ -44,6 +47,7 @@ impl Clone for Fleet {
         self.clock_s.clone_from(&from.clock_s);
         self.id.clone_from(&from.id);
         self.driver.clone_from(&from.driver);
+        self.mind.clone_from(&from.mind);
     }
 }
 
@@ -77,6 +81,7 @@ impl Fleet {
         self.clock_s.insert(at, 0.0);
         self.id.insert(at, id);
         self.driver.insert(at, driver);
+        self.mind.insert(at, Mind::default());
     }
 
     /// Takes out all vehicles for which `keep` is false, keeping the order.
@@ -98,6 +103,7 @@ impl Fleet {
         self.clock_s.truncate(kept);
         self.id.truncate(kept);
         self.driver.truncate(kept);
+        self.mind.truncate(kept);
     }
 
     /// Restores the order after a step. Insertion sort: in one step few vehicles overtake.
@@ -125,5 +131,6 @@ impl Fleet {
         self.clock_s.swap(i, j);
         self.id.swap(i, j);
         self.driver.swap(i, j);
+        self.mind.swap(i, j);
     }
 }

@@ -6,6 +6,8 @@
 /// Length of a cell, m.
 pub(crate) const CELL_M: f64 = 10.0;
 const CELLS_PER_M: f64 = 1.0 / CELL_M;
+/// A lower limit is prepared for from this far on, m.
+const SIGHT_M: f64 = 300.0;
 
 /// No lane.
 pub(crate) const NO_LANE: u16 = u16::MAX;
@@ -39,6 +41,9 @@ pub(crate) struct Lane {
     width_m: Vec<f64>,
     /// Speed limit in the cell, m/s.
     limit_m_s: Vec<f64>,
+    /// Start and value of the lower limit ahead that asks for the hardest braking, m, m/s; infinite
+    /// where there is none.
+    lower: Vec<(f64, f64)>,
     /// Lanes to the left and right in the cell.
     beside: Vec<(u16, u16)>,
 }
@@ -74,6 +79,12 @@ impl Lane {
     pub(crate) fn limit_m_s(&self, s_m: f64) -> f64 {
         self.limit_m_s[self.cell(s_m).0]
     }
+
+    /// The lower limit that drivers prepare for at a station: where it begins, m, and what it is,
+    /// m/s; infinite where there is none.
+    pub(crate) fn lower_limit(&self, s_m: f64) -> (f64, f64) {
+        self.lower[self.cell(s_m).0]
+    }
 }
 
 /// One lane as functions of station, before it is put into cells.
@@ -96,7 +107,9 @@ impl LaneSource<'_> {
         let cells = libm::ceil((self.s_end_m - self.s_start_m) * CELLS_PER_M).max(1.0) as usize;
         let border = |k: usize| (self.s_start_m + k as f64 * CELL_M).min(self.s_end_m);
         let middle = |k: usize| 0.5 * (border(k) + border(k + 1));
+        let limit_m_s: Vec<f64> = (0..cells).map(|k| (self.limit_m_s)(middle(k))).collect();
         Lane {
+            lower: lower_limits(&limit_m_s, self.s_start_m),
             usage: self.usage,
             drops: self.drops,
             leaves: self.leaves,
@@ -104,10 +117,32 @@ impl LaneSource<'_> {
             s_end_m: self.s_end_m,
             center_d_m: (0..=cells).map(|k| (self.center_d_m)(border(k))).collect(),
             width_m: (0..=cells).map(|k| (self.width_m)(border(k))).collect(),
-            limit_m_s: (0..cells).map(|k| (self.limit_m_s)(middle(k))).collect(),
+            limit_m_s,
             beside: (0..cells).map(|k| (self.beside)(middle(k))).collect(),
         }
     }
+}
+
+/// For each cell the lower limit within [`SIGHT_M`] ahead that asks for the hardest braking from the
+/// limit of the cell, `(v² - v_lower²) / (2 x)`.
+fn lower_limits(limit_m_s: &[f64], s_start_m: f64) -> Vec<(f64, f64)> {
+    let sight = (SIGHT_M * CELLS_PER_M) as usize;
+    let at = |k: usize| limit_m_s.get(k).copied().unwrap_or(f64::INFINITY);
+    (0..limit_m_s.len())
+        .map(|k| {
+            let mut hardest = (0.0, (f64::INFINITY, f64::INFINITY));
+            for j in k + 1..=k + sight {
+                if at(j) < at(j - 1) && at(j) < at(k) {
+                    let x_m = (j - k) as f64 * CELL_M;
+                    let braking = (at(k) * at(k) - at(j) * at(j)) / x_m;
+                    if braking > hardest.0 {
+                        hardest = (braking, (s_start_m + j as f64 * CELL_M, at(j)));
+                    }
+                }
+            }
+            hardest.1
+        })
+        .collect()
 }
 
 /// All lanes and the grade.

@@ -1,12 +1,14 @@
 //! Native traffic: IDM car following, MOBIL lane changes, inflow, ramps, grades, the ego seen by
 //! lateral overlap.
 mod boundary;
+mod changes;
 mod config;
 mod driver;
 mod ego;
 mod engine;
 mod fleet;
 mod from_road;
+mod human;
 mod inflow;
 mod lanes;
 mod neighbours;
@@ -18,9 +20,12 @@ pub use boundary::Boundary;
 pub use config::{ClassConfig, Density, FAMILY_MAX_SPEEDS_M_S, TrafficConfig};
 pub(crate) use ego::EgoSpans;
 pub(crate) use from_road::lane_map;
+pub use human::HumanConfig;
 pub(crate) use lanes::LaneMap;
 pub(crate) use publish::carry_on;
 pub use source::{NativeCounts, NativeSnapshot, NativeTraffic};
 
+#[cfg(test)]
+mod population_tests;
 #[cfg(test)]
 mod tests;

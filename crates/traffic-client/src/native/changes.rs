@@ -1,0 +1,258 @@
+//! Lane changes: who has to, who wants to, who makes room, and what a change does to the others.
+//!
+//! A driver thinks about it twice a second. A needed change (the lane ends, the exit comes) is made
+//! as soon as MOBIL's safety criterion allows it; another one if MOBIL's incentive is positive and
+//! it does not undo the last one. Needed changes follow LMRS (Schakel, Knoop, van Arem, Transp. Res.
+//! Record 2316 (2012) 47): the nearer their end comes, the shorter gaps and the harder braking are
+//! accepted; who has to change adapts to the new leader ahead of time (synchronization), the new
+//! follower lets one in (cooperation), and both go back to their own headways slowly (relaxation).
+
+use driver_models::{Change, Mobil};
+
+use super::engine::Engine;
+use super::lanes::NO_LANE;
+use super::neighbours::{EGO, LEFT, NOBODY, OWN, RIGHT};
+
+/// A driver thinks about a lane change every so many ticks.
+pub(super) const DECISION_TICKS: u64 = 5;
+/// From this desire on drivers adapt to the lane that they need, and others let them in.
+const COOPERATES: f64 = 0.5;
+/// However little a change is needed yet, this part of the safe braking is accepted.
+const LEAST_DESIRE: f64 = 0.2;
+/// Two changes into one lane in the same tick start at least this far apart, m: the later one
+/// would decide on neighbours that are no longer right.
+const APART_M: f64 = 150.0;
+
+/// Does this vehicle think about a lane change in this tick?
+pub(super) fn is_due(tick: u64, id: u64) -> bool {
+    (tick + id).is_multiple_of(DECISION_TICKS)
+}
+
+/// A lane change that has to be made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Need {
+    side: usize,
+    distance_m: f64,
+}
+
+impl Engine {
+    /// The lane change that vehicle `i` has to make, if any.
+    fn need(&self, i: usize) -> Option<Need> {
+        let fleet = &self.state.fleet;
+        let (lane, s, exit) = (fleet.lane[i], fleet.s_m[i], fleet.driver[i].exit);
+        let here = &self.map.lanes[lane as usize];
+        let ahead = self.config.mandatory_ahead_m;
+        if exit != NO_LANE && lane != exit {
+            let out = &self.map.lanes[exit as usize];
+            if s < out.s_end_m && s > out.s_start_m - ahead {
+                let at = s.max(out.s_start_m);
+                let right = out.center_d_m(at) < here.center_d_m(s);
+                let side = if right { RIGHT } else { LEFT };
+                return Some(Need { side, distance_m: out.s_end_m - s });
+            }
+        }
+        if lane != exit && self.map.ends_early(lane) && s > here.s_end_m - ahead {
+            let reach = |side: usize| match self.near.lanes[i][side] {
+                NO_LANE => f64::NEG_INFINITY,
+                k if self.map.is_open_to(k, exit) => self.map.lanes[k as usize].s_end_m,
+                _ => f64::NEG_INFINITY,
+            };
+            let side = if reach(LEFT) >= reach(RIGHT) { LEFT } else { RIGHT };
+            return Some(Need { side, distance_m: here.s_end_m - s });
+        }
+        None
+    }
+
+    fn least_frac(&self, i: usize) -> f64 {
+        self.minds.least_frac(self.state.fleet.driver[i].idm.headway_s)
+    }
+
+    /// How much a change is needed, 0 to 1: it grows from where drivers begin to think of it to the
+    /// point where it must be done (LMRS, Eq. 4, by distance).
+    fn desire(&self, need: &Need) -> f64 {
+        (1.0 - need.distance_m / self.config.mandatory_ahead_m).clamp(0.0, 1.0)
+    }
+
+    /// Part of their gap that drivers are content with at a desire (LMRS, Eq. 7).
+    fn content_frac(&self, i: usize, desire: f64) -> f64 {
+        let now = self.state.fleet.mind[i].headway_frac;
+        now.min(1.0 - desire * (1.0 - self.least_frac(i)))
+    }
+
+    /// Vehicles that have to change adapt to their new leader; their new follower lets them in.
+    pub(super) fn make_room(&mut self, i: usize) {
+        let fleet = &self.state.fleet;
+        if fleet.is_changing(i) {
+            return;
+        }
+        let Some(need) = self.need(i) else { return };
+        let desire = self.desire(&need);
+        if desire < COOPERATES {
+            return;
+        }
+        let lane = self.near.lanes[i][need.side];
+        if lane == NO_LANE {
+            return;
+        }
+        let comfortable = fleet.driver[i].idm.decel_m_s2;
+        let taken = self.behind_at_m_s2(
+            i,
+            self.near.leader[i][need.side],
+            lane,
+            self.content_frac(i, desire),
+        );
+        let own = fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, fleet.lane[i]), taken);
+        let follower = self.near.follower[i][need.side];
+        self.raw_a_m_s2[i] = self.raw_a_m_s2[i].min(own.max(-comfortable));
+        if follower < EGO {
+            let f = follower as usize;
+            let yields = self.in_lane_m_s2(f, i as u32, lane, self.content_frac(f, desire));
+            let bounded = yields.max(-self.config.yield_decel_m_s2);
+            self.raw_a_m_s2[f] = self.raw_a_m_s2[f].min(bounded);
+        }
+    }
+
+    pub(super) fn change_lanes(&mut self) {
+        self.begun_m.clear();
+        self.begun_m.resize(self.map.lanes.len(), f64::INFINITY);
+        for i in (0..self.state.fleet.len()).rev() {
+            let fleet = &self.state.fleet;
+            if !is_due(self.state.tick, fleet.id[i])
+                || fleet.is_changing(i)
+                || fleet.clock_s[i] < 0.0
+            {
+                continue;
+            }
+            if let Some((side, lane)) = self.best_change(i) {
+                self.begin(i, side, lane);
+            }
+        }
+    }
+
+    /// Begins a change: the driver remembers why, and he and the new follower accept their gaps.
+    fn begin(&mut self, i: usize, side: usize, lane: u16) {
+        let (leader, follower) = (self.near.leader[i][side], self.near.follower[i][side]);
+        let own_frac = self.steady_frac(i, leader, lane);
+        let cut_in_on = (follower < EGO).then_some(follower as usize);
+        let their_frac = cut_in_on.map(|f| self.steady_frac(f, i as u32, lane));
+        let left_behind = self.number(self.near.leader[i][OWN]);
+        let (own_least, tick) = (self.least_frac(i), self.state.tick);
+        if let (Some(f), Some(frac)) = (cut_in_on, their_frac) {
+            let least = self.least_frac(f);
+            self.state.fleet.mind[f].accept(frac, least);
+        }
+        let fleet = &mut self.state.fleet;
+        let from = fleet.lane[i];
+        let mind = &mut fleet.mind[i];
+        mind.headway_frac = 1.0;
+        mind.accept(own_frac, own_least);
+        mind.changed(from, tick, left_behind);
+        fleet.target[i] = lane;
+        fleet.clock_s[i] = 0.0;
+        self.begun_m[lane as usize] = fleet.s_m[i];
+        self.state.lane_changes += 1;
+    }
+
+    /// Part of the own headway at which a driver would keep the gap that is there.
+    fn steady_frac(&self, i: usize, leader: u32, lane: u16) -> f64 {
+        let Some((rear_m, _)) = self.rear_and_speed(leader, lane) else { return 1.0 };
+        let fleet = &self.state.fleet;
+        let idm = &fleet.driver[i].idm;
+        (rear_m - fleet.s_m[i]) / (idm.min_gap_m + fleet.v_m_s[i] * idm.headway_s)
+    }
+
+    /// Number of a vehicle, that of the ego being none that a vehicle has.
+    fn number(&self, who: u32) -> Option<u64> {
+        match who {
+            NOBODY => None,
+            EGO => Some(u64::MAX),
+            j => Some(self.state.fleet.id[j as usize]),
+        }
+    }
+
+    /// Side and lane to change to now: the needed one if it is safe, else the one that pays most.
+    fn best_change(&self, i: usize) -> Option<(usize, u16)> {
+        if let Some(need) = self.need(i) {
+            let desire = Some(self.desire(&need));
+            return self.change_m_s2(i, need.side, desire).map(|(lane, _)| (need.side, lane));
+        }
+        let mut best: Option<(usize, u16, f64)> = None;
+        for side in [LEFT, RIGHT] {
+            if let Some((lane, gain)) = self.change_m_s2(i, side, None)
+                && gain > best.map_or(0.0, |b| b.2)
+            {
+                best = Some((side, lane, gain));
+            }
+        }
+        best.map(|b| (b.0, b.1))
+    }
+
+    /// MOBIL for one side: lane and incentive, m/s², if the change is possible and safe.
+    fn change_m_s2(&self, i: usize, side: usize, desire: Option<f64>) -> Option<(u16, f64)> {
+        let fleet = &self.state.fleet;
+        let (lane, s) = (self.near.lanes[i][side], fleet.s_m[i]);
+        if lane == NO_LANE || !self.map.is_open_to(lane, fleet.driver[i].exit) {
+            return None;
+        }
+        let to = &self.map.lanes[lane as usize];
+        if desire.is_none()
+            && self.map.ends_early(lane)
+            && to.s_end_m - s < self.config.mandatory_ahead_m
+        {
+            return None;
+        }
+        if self.begun_m[lane as usize] - s < APART_M {
+            return None;
+        }
+        let (leader, follower) = (self.near.leader[i][side], self.near.follower[i][side]);
+        let mind = &fleet.mind[i];
+        if desire.is_none()
+            && mind.would_undo(&self.minds, lane, self.state.tick, self.number(follower))
+        {
+            return None;
+        }
+        let frac =
+            |i: usize| desire.map_or(fleet.mind[i].headway_frac, |d| self.content_frac(i, d));
+        let (new_before, new_after) = match follower {
+            NOBODY => (0.0, 0.0),
+            EGO => (0.0, self.ego_behind_m_s2(i, lane)),
+            f => {
+                let (f, before) = (f as usize, self.raw_a_m_s2[f as usize]);
+                let after = self.in_lane_m_s2(f, i as u32, lane, frac(f));
+                (before, after.min(before))
+            }
+        };
+        let (old_before, old_after) = match self.near.follower[i][OWN] {
+            NOBODY | EGO => (0.0, 0.0),
+            o => {
+                let (o, before) = (o as usize, self.raw_a_m_s2[o as usize]);
+                let ahead = self.near.leader[i][OWN];
+                let after = self.in_lane_m_s2(o, ahead, fleet.lane[i], fleet.mind[o].headway_frac);
+                (before, after.max(before))
+            }
+        };
+        let change = Change {
+            own_before_m_s2: self.raw_a_m_s2[i],
+            own_after_m_s2: self.in_lane_m_s2(i, leader, lane, frac(i)),
+            new_follower_before_m_s2: new_before,
+            new_follower_after_m_s2: new_after,
+            old_follower_before_m_s2: old_before,
+            old_follower_after_m_s2: old_after,
+        };
+        let class = self.class(i);
+        let mobil = Mobil {
+            politeness_frac: fleet.driver[i].politeness_frac,
+            safe_decel_m_s2: class.safe_decel_m_s2 * desire.map_or(1.0, |d| d.max(LEAST_DESIRE)),
+            threshold_m_s2: class.threshold_m_s2,
+            right_bias_m_s2: class.right_bias_m_s2,
+        };
+        mobil.is_safe(&change).then(|| (lane, mobil.incentive_m_s2(&change, side == RIGHT)))
+    }
+
+    /// Braking that a cut-in before the ego would ask of it, m/s².
+    fn ego_behind_m_s2(&self, i: usize, lane: u16) -> f64 {
+        let Some(span) = self.ego.in_lane(lane) else { return 0.0 };
+        let (v, gap) = (self.ego.speed_m_s, self.state.fleet.rear_m(i) - span.front_m);
+        self.ego_driver.interaction_m_s2(v, gap, v - self.state.fleet.v_m_s[i])
+    }
+}
