@@ -105,9 +105,9 @@ pub fn fidelity(truck: &TruckParameters, drive: &Drive) -> Result<DriveFidelity,
         let (whole, free) = (of(&open_loop), of(&free_runs));
         for horizon_s in HORIZONS_S {
             let within = |i: usize| since[i] < samples(horizon_s);
-            signals.extend(compare(*channel, Some(horizon_s), measured, &free, within));
+            signals.extend(compare(channel.name(), Some(horizon_s), measured, &free, within));
         }
-        signals.extend(compare(*channel, None, measured, &whole, |_| true));
+        signals.extend(compare(channel.name(), None, measured, &whole, |_| true));
         replayed.push(Replayed {
             quantity: channel.name(),
             measured: measured.to_vec(),
@@ -122,8 +122,9 @@ fn samples(seconds: f64) -> usize {
     (seconds / Drive::STEP_S).round() as usize
 }
 
-fn compare(
-    channel: C,
+/// One signal over the samples that lie `within`; none without such samples.
+pub(crate) fn compare(
+    quantity: &'static str,
     horizon_s: Option<f64>,
     measured: &[f64],
     simulated: &[f64],
@@ -137,7 +138,7 @@ fn compare(
         }
     }
     (s[3] > 0.0).then(|| SignalFidelity {
-        quantity: channel.name(),
+        quantity,
         horizon_s,
         mean_abs_error: s[0] / s[3],
         mean_abs: s[1] / s[3],

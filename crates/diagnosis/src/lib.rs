@@ -41,6 +41,7 @@ mod table_trial;
 mod threads;
 mod unknown;
 mod verdict;
+mod whole_run;
 
 pub use channel::Channel;
 pub use diagnosis::{Baseline, Options, Progress, diagnose, diagnose_with};
@@ -52,7 +53,7 @@ pub use hypothesis::CauseKind;
 pub use outcome::{Outcome, Request};
 pub use overlay::{Extension, extend};
 pub use plant::Plant;
-pub use read::{RawTable, read_drives, read_drives_with, read_table};
+pub use read::{RawTable, read_drives, read_drives_with, read_table, read_traces};
 pub use replay::Module;
 pub use report_models::Models;
 pub use table_trial::{TableTrial, try_table};
@@ -61,3 +62,4 @@ pub use verdict::{
     BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Parameter, Unknown, Verdict,
     Wrong,
 };
+pub use whole_run::{Trace, whole_run};

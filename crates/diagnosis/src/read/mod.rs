@@ -9,7 +9,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use crate::drive::RoadMap;
-use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial, collect};
+use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial, Trace, collect};
 
 /// Columns of one file by name, as written, `NaN` where a value is missing.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -45,6 +45,90 @@ struct Entry {
     tyres_warm_at_start: Option<bool>,
 }
 
+/// Name of a folder's index.
+const INDEX: &str = "drives.toml";
+
+impl Index {
+    fn read(dir: &Path) -> Result<Self, DiagnosisError> {
+        let path = dir.join(INDEX);
+        let text = std::fs::read_to_string(&path)
+            .map_err(|e| DiagnosisError::Io { path: path.clone(), why: e.to_string() })?;
+        let bad = |why: String| DiagnosisError::Index { path: path.clone(), why };
+        let index: Index = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
+        if index.schema != 1 {
+            return Err(bad(format!("schema = {}, this program reads schema 1", index.schema)));
+        }
+        if index.drive.is_empty() {
+            return Err(bad("no [[drive]] in it".into()));
+        }
+        for (i, entry) in index.drive.iter().enumerate() {
+            if index.drive[..i].iter().any(|d| d.name == entry.name) {
+                return Err(bad(format!("two drives are named {:?}", entry.name)));
+            }
+        }
+        Ok(index)
+    }
+}
+
+/// Reads a folder of traces of any length for [`crate::whole_run`]: the tables that its
+/// `drives.toml` names, or, without one, every CSV file, its mass taken from its name
+/// (`accel_18t.csv`, `brake_m18000.csv`).
+///
+/// # Errors
+/// A file that cannot be read or decoded, an index of another form, a trace without a mass.
+pub fn read_traces(dir: &Path) -> Result<Vec<Trace>, DiagnosisError> {
+    if dir.join(INDEX).is_file() {
+        let entries = Index::read(dir)?.drive.into_iter();
+        return entries.map(|e| trace(&dir.join(&e.file), e.name, e.reported_mass_kg)).collect();
+    }
+    let io = |e: std::io::Error| DiagnosisError::Io { path: dir.to_owned(), why: e.to_string() };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(dir).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
+            files.push(path);
+        }
+    }
+    files.sort();
+    if files.is_empty() {
+        return Err(DiagnosisError::Io {
+            path: dir.to_owned(),
+            why: format!("no {INDEX} and no CSV file in it"),
+        });
+    }
+    let stem = |p: &Path| p.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    files.iter().map(|f| trace(f, stem(f), mass_in_name_kg(&stem(f)))).collect()
+}
+
+fn trace(path: &Path, name: String, mass_kg: Option<f64>) -> Result<Trace, DiagnosisError> {
+    let table = read_table(path)?;
+    match mass_kg {
+        Some(mass_kg) if PLAUSIBLE_MASS_KG.contains(&mass_kg) => Ok(Trace { name, mass_kg, table }),
+        Some(kg) => Err(DiagnosisError::Table {
+            path: path.to_owned(),
+            why: format!("a mass of {kg} kg is no truck's"),
+        }),
+        None => Err(DiagnosisError::Table {
+            path: path.to_owned(),
+            why: "no mass: name it in the file's name (_18t, _m18000) or in drives.toml \
+                  (reported_mass_kg)"
+                .into(),
+        }),
+    }
+}
+
+/// Total masses that a load sheet may say, kg.
+const PLAUSIBLE_MASS_KG: core::ops::RangeInclusive<f64> = 1000.0..=200_000.0;
+
+/// `accel_pedal40_18t` or `brake_m18000`, kg.
+fn mass_in_name_kg(stem: &str) -> Option<f64> {
+    stem.split('_').find_map(|word| {
+        let tonnes = word.strip_suffix('t').and_then(|t| t.parse::<f64>().ok());
+        let kg = word.strip_prefix('m').and_then(|m| m.parse::<f64>().ok());
+        tonnes.map(|t| 1e3 * t).or(kg)
+    })
+}
+
 /// Reads `dir/drives.toml` and the tables that it names.
 ///
 /// Defects that leave a drive usable are in [`DriveSet::findings`], with channel, time and what
@@ -62,22 +146,8 @@ pub fn read_drives(dir: &Path) -> Result<DriveSet, DiagnosisError> {
 /// # Errors
 /// As [`read_drives`]; of several drives that cannot be read the first in the index is named.
 pub fn read_drives_with(dir: &Path, executor: &dyn Executor) -> Result<DriveSet, DiagnosisError> {
-    let path = dir.join("drives.toml");
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| DiagnosisError::Io { path: path.clone(), why: e.to_string() })?;
-    let bad = |why: String| DiagnosisError::Index { path: path.clone(), why };
-    let index: Index = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
-    if index.schema != 1 {
-        return Err(bad(format!("schema = {}, this program reads schema 1", index.schema)));
-    }
-    if index.drive.is_empty() {
-        return Err(bad("no [[drive]] in it".into()));
-    }
-    for (i, entry) in index.drive.iter().enumerate() {
-        if index.drive[..i].iter().any(|d| d.name == entry.name) {
-            return Err(bad(format!("two drives are named {:?}", entry.name)));
-        }
-    }
+    let index = Index::read(dir)?;
+    let bad = |why: String| DiagnosisError::Index { path: dir.join(INDEX), why };
     let mut set = DriveSet { truck: index.truck, drives: Vec::new(), findings: Vec::new() };
     for one in collect(executor, index.drive.len(), |i| read_drive(dir, &index.drive[i], &bad)) {
         let (drive, findings) = one?;
@@ -97,7 +167,7 @@ fn read_drive(
     let table = read_table(&dir.join(&entry.file))?;
     let mut drive = grid::to_grid(&entry.name, &table, &mut findings)?;
     if let Some(m) = entry.reported_mass_kg {
-        if !(1000.0..=200_000.0).contains(&m) {
+        if !PLAUSIBLE_MASS_KG.contains(&m) {
             return Err(bad(format!("drive {}: reported_mass_kg = {m}", entry.name)));
         }
         drive.reported_mass_kg = Some(m);

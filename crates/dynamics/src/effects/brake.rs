@@ -3,6 +3,7 @@
 //! ```text
 //! p_demand = m a_demand / K          (or a table over deceleration and mass)
 //! p        dead time, then first-order lag within the fill and vent rates, per axle group
+//! a_asked  a_demand + a_i,  da_i/dt = k_i (a_demand - a_felt) within 0 to a limit (an option)
 //! F        = K p mu(T),  mu(T) = 1 - k_fade max(0, T - T_0), within the road's grip
 //! C dT/dt  = F v - C (T - T_air)/tau
 //! ```
@@ -35,9 +36,22 @@ pub struct BrakeParameters {
     /// Masses of the table, kg: the load-dependent distribution.
     #[serde(default)]
     pub table_mass_kg: Vec<f64>,
-    /// Pressures of the table, Pa: one row per mass, one value per deceleration.
+    /// Pressures of the drive axles in the table, Pa: one row per mass, one value per deceleration.
     #[serde(default)]
     pub table_pressure_pa: Vec<Vec<f64>>,
+    /// Pressures of the steer axle in the same form, Pa; empty = as the drive axles.
+    #[serde(default)]
+    pub table_steer_pressure_pa: Vec<Vec<f64>>,
+    /// Pressures of the trailer's axles in the same form, Pa; empty = as the drive axles.
+    #[serde(default)]
+    pub table_trailer_pressure_pa: Vec<Vec<f64>>,
+    /// Every group's force follows the drive axles' pressure and the other pressures are only
+    /// reported, for models that know one force per demand.
+    #[serde(default)]
+    pub force_from_drive_pressure: bool,
+    /// The control unit's own loop on the deceleration; none = the demand alone.
+    #[serde(default)]
+    pub decel_feedback: Option<DecelFeedback>,
     /// Largest pressure, Pa.
     pub max_pressure_pa: f64,
     /// Dead time from demand to pressure, s.
@@ -79,6 +93,19 @@ fn refill_1_s() -> f64 {
     0.01
 }
 
+/// A control unit that asks for more while the truck brakes less than demanded.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DecelFeedback {
+    /// Integral gain, 1/s.
+    pub gain_1_s: f64,
+    /// Largest deceleration that the loop adds, m/s².
+    pub limit_m_s2: f64,
+    /// What the unit takes for the deceleration, as a factor on the true one; 1 = right.
+    #[serde(default = "one")]
+    pub felt_scale_coeff: f64,
+}
+
 /// What the brakes remember.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct BrakeState {
@@ -88,6 +115,10 @@ pub struct BrakeState {
     pub temperature_k: [f64; GROUPS],
     /// Air in the reservoir, 0 to 1.
     pub reservoir_frac: f64,
+    /// Deceleration that the control unit's loop adds to the demand, m/s².
+    pub feedback_m_s2: f64,
+    /// Deceleration that a test bench tells the control unit instead of the truck's, m/s².
+    pub bench_decel_m_s2: Option<f64>,
 }
 
 /// Friction left in linings that lose `loss_1_k` per kelvin above `from_k`, 0.1 to 1.
@@ -102,7 +133,12 @@ impl BrakeParameters {
         let mut b = Bounds::of("brake");
         b.within("gain_n_pa", self.gain_n_pa, 0.01, 10.0);
         b.within("gain_scale_coeff", self.gain_scale_coeff, 0.05, 3.0);
-        b.result("table_pressure_pa", self.pressure_table(0.0).map(|_| ()));
+        b.result("table_pressure_pa", self.pressure_tables(0.0).map(|_| ()));
+        if let Some(f) = &self.decel_feedback {
+            b.within("decel_feedback.gain_1_s", f.gain_1_s, 0.0, 50.0);
+            b.within("decel_feedback.limit_m_s2", f.limit_m_s2, 0.0, 10.0);
+            b.within("decel_feedback.felt_scale_coeff", f.felt_scale_coeff, 0.0, 20.0);
+        }
         b.within("max_pressure_pa", self.max_pressure_pa, 1e5, 2e6);
         b.within("dead_time_s", self.dead_time_s, 0.0, crate::state::MAX_DELAY_S);
         b.within("lag_s", self.lag_s, 0.005, 2.0);
@@ -117,22 +153,73 @@ impl BrakeParameters {
         b.violations
     }
 
-    /// The pressure table at a mass: pressure (Pa) over deceleration (m/s²). `None` without one.
+    /// The drive axles' pressure table at a mass: pressure (Pa) over deceleration (m/s²). `None`
+    /// without one.
     ///
     /// # Errors
     /// [`CoreError::BadTable`] if the table cannot be used.
     pub fn pressure_table(&self, mass_kg: f64) -> Result<Option<Curve>, CoreError> {
-        let (x, y) = (&self.table_mass_kg, &self.table_decel_m_s2);
-        if x.is_empty() && y.is_empty() && self.table_pressure_pa.is_empty() {
-            return Ok(None);
-        }
-        let rows = self.table_pressure_pa.iter().flatten().copied().collect();
-        let grid = Grid::new("table_pressure_pa", x.clone(), y.clone(), rows)?;
-        let at_mass = y.iter().map(|&a| grid.at(mass_kg, a)).collect();
-        Curve::new("table_pressure_pa", y.clone(), at_mass).map(Some)
+        Ok(self.pressure_tables(mass_kg)?.map(|[_, drive, _]| drive))
     }
 
-    /// Mean pressure that a deceleration demand asks for, Pa.
+    /// The tables of the steer, drive and trailer axles at a mass: pressure (Pa) over deceleration
+    /// (m/s²). `None` without tables.
+    ///
+    /// # Errors
+    /// [`CoreError::BadTable`] if a table cannot be used.
+    pub fn pressure_tables(&self, mass_kg: f64) -> Result<Option<[Curve; GROUPS]>, CoreError> {
+        let (x, y) = (&self.table_mass_kg, &self.table_decel_m_s2);
+        let tables = [
+            &self.table_steer_pressure_pa,
+            &self.table_pressure_pa,
+            &self.table_trailer_pressure_pa,
+        ];
+        if x.is_empty() && y.is_empty() && tables.iter().all(|t| t.is_empty()) {
+            return Ok(None);
+        }
+        let of = |name, own: &Vec<Vec<f64>>| {
+            let table = if own.is_empty() { &self.table_pressure_pa } else { own };
+            let rows = table.iter().flatten().copied().collect();
+            let grid = Grid::new(name, x.clone(), y.clone(), rows)?;
+            let at_mass = y.iter().map(|&a| grid.at(mass_kg, a)).collect();
+            Curve::new(name, y.clone(), at_mass)
+        };
+        Ok(Some([
+            of("table_steer_pressure_pa", tables[0])?,
+            of("table_pressure_pa", tables[1])?,
+            of("table_trailer_pressure_pa", tables[2])?,
+        ]))
+    }
+
+    /// Deceleration that the control unit asks of the brakes, m/s²: the demand, and what its own
+    /// loop adds after `dt_s` at the truck's acceleration.
+    #[must_use]
+    pub fn asked_decel_m_s2(
+        &self,
+        state: &mut BrakeState,
+        demand_m_s2: f64,
+        accel_m_s2: f64,
+        dt_s: f64,
+    ) -> f64 {
+        let Some(f) = &self.decel_feedback else { return demand_m_s2 };
+        if demand_m_s2 <= 0.0 {
+            state.feedback_m_s2 = 0.0;
+            return demand_m_s2;
+        }
+        let felt = state.bench_decel_m_s2.unwrap_or(f.felt_scale_coeff * (-accel_m_s2).max(0.0));
+        let next = state.feedback_m_s2 + dt_s * f.gain_1_s * (demand_m_s2 - felt);
+        state.feedback_m_s2 = next.clamp(0.0, f.limit_m_s2);
+        demand_m_s2 + state.feedback_m_s2
+    }
+
+    /// Pressure that a group's force follows, Pa.
+    #[must_use]
+    pub fn acting_pressure_pa(&self, state: &BrakeState, group: usize) -> f64 {
+        state.pressure_pa[if self.force_from_drive_pressure { 1 } else { group }]
+    }
+
+    /// Pressure that a deceleration demand asks for, Pa: from an axle group's table, or from mass
+    /// and K.
     #[must_use]
     pub fn demand_pa(&self, decel_m_s2: f64, mass_kg: f64, table: Option<&Curve>) -> f64 {
         let p = match table {

@@ -14,10 +14,11 @@ impl TruckModel {
     /// Pressures towards the demand; forces follow in `longitudinal`.
     pub(super) fn service_brakes(&self, s: &mut TruckState, decel: f64, patch: &RoadPatch) {
         let b = &self.parameters.brake;
-        let demand = b
-            .demand_pa(decel, self.mass_kg, self.brake_table.as_ref())
-            .min(b.max_pressure_pa * s.brake.reservoir_frac);
+        let asked = b.asked_decel_m_s2(&mut s.brake, decel, s.accel_m_s2, SUBSTEP_S);
+        let most = b.max_pressure_pa * s.brake.reservoir_frac;
         for g in 0..GROUPS {
+            let table = self.brake_tables.as_ref().map(|t| &t[g]);
+            let demand = b.demand_pa(asked, self.mass_kg, table).min(most);
             let before = s.brake.pressure_pa[g];
             let after = b.pressure_step_pa(before, demand, SUBSTEP_S);
             s.brake.pressure_pa[g] = after;
@@ -28,7 +29,8 @@ impl TruckModel {
         s.brake.reservoir_frac = (s.brake.reservoir_frac + refill).clamp(0.0, 1.0);
         for g in 0..GROUPS {
             let share = self.brake_share[g];
-            let force = b.force_n(share, s.brake.pressure_pa[g], s.brake.temperature_k[g]);
+            let pressure = b.acting_pressure_pa(&s.brake, g);
+            let force = b.force_n(share, pressure, s.brake.temperature_k[g]);
             let power = force * s.speed_m_s.abs();
             s.brake.temperature_k[g] = b.temperature_step_k(
                 s.brake.temperature_k[g],
@@ -64,7 +66,8 @@ impl TruckModel {
         let mut brake_n = 0.0;
         for (g, axles) in GROUP_AXLES.into_iter().enumerate() {
             let share = self.brake_share[g];
-            let wanted = b.force_n(share, s.brake.pressure_pa[g], s.brake.temperature_k[g]);
+            let pressure = b.acting_pressure_pa(&s.brake, g);
+            let wanted = b.force_n(share, pressure, s.brake.temperature_k[g]);
             let held = wanted.min(grip * share * self.mass_kg * GRAVITY_M_S2);
             brake_n += held;
             let count = axles.len() as f64;

@@ -38,7 +38,8 @@ pub struct TruckModel {
     pub(crate) mass_kg: f64,
     /// Share of braking per axle group: its share of the load.
     pub(crate) brake_share: [f64; GROUPS],
-    brake_table: Option<Curve>,
+    /// Pressure over deceleration of the steer, drive and trailer axles.
+    brake_tables: Option<[Curve; GROUPS]>,
     tables: Vec<(TableSignal, Curve)>,
     /// Engine speed per road speed in each gear, rad/m.
     ratio_rad_m: Vec<f64>,
@@ -65,9 +66,9 @@ impl TruckModel {
             LateralModel::new(&parameters.lateral).map_err(|e| refuse(&name, e.to_string()))?;
         let engine =
             Engine::new(parameters.engine.clone()).map_err(|e| refuse(&name, e.to_string()))?;
-        let brake_table = parameters
+        let brake_tables = parameters
             .brake
-            .pressure_table(parameters.lateral.total_mass_kg())
+            .pressure_tables(parameters.lateral.total_mass_kg())
             .map_err(|e| refuse(&name, e.to_string()))?;
         let tables: Result<Vec<_>, _> =
             parameters.table_effects.iter().map(table::TableEffect::curve).collect();
@@ -86,7 +87,7 @@ impl TruckModel {
             brake_steps: steps(parameters.brake.dead_time_s),
             engine,
             lateral,
-            brake_table,
+            brake_tables,
             tables,
             parameters,
         })

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use diagnosis::fidelity::{DriveFidelity, Replayed, SignalFidelity, fidelity};
-use diagnosis::{Threads, collect};
+use diagnosis::{Threads, collect, read_traces, whole_run};
 use dynamics::TruckParameters;
 use serde::Serialize;
 
@@ -25,6 +25,11 @@ pub(crate) struct Args {
     /// Folder of measured drives, or recordings of this program.
     #[arg(long, value_name = "DIR")]
     drives: PathBuf,
+    /// Traces of any length, from standstill if need be, each in one open loop in which the truck
+    /// shifts by itself. The folder may be one of CSV files without drives.toml, with the mass in
+    /// the file's name (_18t).
+    #[arg(long)]
+    whole: bool,
     /// Folder of the results.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -48,16 +53,21 @@ struct FidelityJson<'a> {
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let truck = TruckParameters::load(&args.truck).map_err(Failure::input)?;
-    let set = read(&args.drives, &truck, &args.out.join("drives"), 1)?;
     let stages = Stages::start();
-    stages.show("replaying the drives");
-    let drives =
-        collect(&Threads::available(), set.drives.len(), |i| fidelity(&truck, &set.drives[i]));
+    let drives = if args.whole {
+        let traces = read_traces(&args.drives).map_err(Failure::input)?;
+        stages.show("replaying the traces");
+        collect(&Threads::available(), traces.len(), |i| whole_run(&truck, &traces[i]))
+    } else {
+        let set = read(&args.drives, &truck, &args.out.join("drives"), 1)?;
+        stages.show("replaying the drives");
+        collect(&Threads::available(), set.drives.len(), |i| fidelity(&truck, &set.drives[i]))
+    };
     stages.finish();
     let drives: Vec<DriveFidelity> =
         drives.into_iter().collect::<Result<_, _>>().map_err(Failure::input)?;
     let overall = overall(&drives);
-    let text = sentence(&overall);
+    let text = if args.whole { by_trace(&drives) } else { sentence(&overall) };
     let json = FidelityJson {
         provenance: Provenance::of_seed(0),
         truck: &truck.name,
@@ -69,7 +79,13 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
     write(&args.out.join("fidelity.json"), &json)?;
     let title = format!("{} in open loop on measured inputs", truck.name);
-    let picture = page(&title, &text, "time, min (drives one after the other)", &strips(&drives));
+    let picture = if args.whole {
+        let axis = "time, s (traces one after the other)";
+        page(&title, &text, axis, &strips(&drives, 1, diagnosis::Drive::STEP_S))
+    } else {
+        let axis = "time, min (drives one after the other)";
+        page(&title, &text, axis, &strips(&drives, THIN, diagnosis::Drive::STEP_S / 60.0))
+    };
     write(&args.out.join("replay.html"), &picture)?;
     output::result(if args.json { &json } else { &text });
     Ok(())
@@ -95,10 +111,23 @@ fn overall(drives: &[DriveFidelity]) -> Vec<SignalFidelity> {
     out
 }
 
+fn percent(s: &SignalFidelity) -> String {
+    s.accuracy_frac.map_or_else(|| "–".to_owned(), |a| format!("{:.1} %", 100.0 * a))
+}
+
+/// Every trace alone: a mean would hide the one that is missed.
+fn by_trace(drives: &[DriveFidelity]) -> String {
+    let mut lines =
+        vec!["Accuracy (1 - mean |error| / mean |measured|) of whole traces:".to_owned()];
+    for d in drives {
+        let cells: Vec<String> =
+            d.signals.iter().map(|s| format!("{} {}", s.quantity, percent(s))).collect();
+        lines.push(format!("  {}: {}", d.drive, cells.join(", ")));
+    }
+    lines.join("\n")
+}
+
 fn sentence(overall: &[SignalFidelity]) -> String {
-    let percent = |s: &SignalFidelity| {
-        s.accuracy_frac.map_or_else(|| "–".to_owned(), |a| format!("{:.1} %", 100.0 * a))
-    };
     let mut names: Vec<&str> = Vec::new();
     for s in overall {
         if !names.contains(&s.quantity) {
@@ -123,12 +152,15 @@ fn sentence(overall: &[SignalFidelity]) -> String {
 const THIN: usize = 20;
 
 /// A strip of the picture: title, quantity, factor.
-const STRIPS: [(&str, &str, f64); 6] = [
+const STRIPS: [(&str, &str, f64); 9] = [
     ("speed, km/h", "speed_m_s", 3.6),
     ("engine speed, rpm", "engine_speed_rpm", 1.0),
     ("engine torque, %", "engine_torque_percent", 1.0),
     ("gear", "gear", 1.0),
     ("brake pressure, kPa", "brake_pressure_kpa", 1.0),
+    ("steer axle pressure, kPa", "brake_pressure_steer_kpa", 1.0),
+    ("drive axle pressure, kPa", "brake_pressure_drive_kpa", 1.0),
+    ("trailer pressure, kPa", "brake_pressure_trailer_kpa", 1.0),
     ("yaw rate, rad/s", "yaw_rate_rad_s", 1.0),
 ];
 /// A way to see a signal: name, color, values.
@@ -139,18 +171,19 @@ const VIEWS: [View; 3] = [
     ("whole drive in open loop", "#d1495b", |r| &r.open_loop),
 ];
 
-fn strips(drives: &[DriveFidelity]) -> Vec<Strip> {
-    let minutes_per_point = THIN as f64 * diagnosis::Drive::STEP_S / 60.0;
+/// Every `thin`th sample, `per_sample` of the axis' unit apart before that.
+fn strips(drives: &[DriveFidelity], thin: usize, per_sample: f64) -> Vec<Strip> {
+    let per_point = thin as f64 * per_sample;
     let strip = |(title, quantity, factor): &(&'static str, &str, f64)| {
         let lines = VIEWS.iter().map(|(name, color, values)| {
             let mut y = Vec::new();
             for drive in drives {
                 if let Some(r) = drive.replayed.iter().find(|r| r.quantity == *quantity) {
-                    y.extend(values(r).iter().step_by(THIN).map(|v| factor * v));
+                    y.extend(values(r).iter().step_by(thin).map(|v| factor * v));
                 }
                 y.push(f64::NAN);
             }
-            let x = (0..y.len()).map(|i| i as f64 * minutes_per_point).collect();
+            let x = (0..y.len()).map(|i| i as f64 * per_point).collect();
             Line { name: (*name).to_owned(), x, y, color, style: Style::Solid }
         });
         let lines: Vec<Line> = lines.filter(|l| l.y.iter().any(|v| v.is_finite())).collect();
