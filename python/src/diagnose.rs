@@ -13,6 +13,7 @@ use crate::provenance;
 /// The text of `diagnosis.json`; with `out`, also the files there.
 #[pyfunction]
 #[pyo3(signature = (truck, drives, *, baseline, hold_out, table_effect, seed, out))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub(crate) fn diagnose_json(
     py: Python<'_>,
     truck: &str,

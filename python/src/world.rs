@@ -127,6 +127,7 @@ impl World {
     #[new]
     #[pyo3(signature = (name, json, *, seed, road, truck, payload_kg, traffic, mode, manifest,
         on_traffic_failure, decider, speed_planner, duration_s))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         py: Python<'_>,
         name: &str,

@@ -39,6 +39,7 @@ pub(crate) type Start = [f64; 2];
 
 const ONE: &[Start] = &[[0.0; 2]];
 
+#[expect(clippy::too_many_arguments, reason = "a row of the table below")]
 const fn h(
     id: &'static str,
     kind: CauseKind,

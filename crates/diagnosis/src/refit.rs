@@ -13,6 +13,10 @@ use crate::stats::evidence;
 const KEPT_PROMISE: f64 = 0.1;
 /// Part of what it promises below which a step is compared with one of the newest member alone.
 const BROKEN_PROMISE: f64 = 0.5;
+/// Gauss-Newton steps of a fit at the most.
+const MOST_STEPS: usize = 8;
+/// Shares of a step that are tried, one after the other.
+const HALVINGS: [f64; 4] = [1.0, 0.35, 0.12, 0.043];
 /// Secant steps by which a threshold or a time constant may move at once: few samples lie about a
 /// threshold, and far from it a fit gets stuck.
 const SHAPE_STEPS: f64 = 4.0;
@@ -48,90 +52,165 @@ pub(crate) fn prior(free: &[P]) -> Vec<f64> {
     free.iter().map(|p| p.spec().prior).collect()
 }
 
-/// Where a step leads, the fall of the cost, and what the linear model promised.
-type Step = (Theta, f64, f64);
+/// A step that was tried.
+#[derive(Clone, Copy)]
+struct Step {
+    /// Where it leads.
+    to: Theta,
+    /// Fall of the cost.
+    improved: f64,
+    /// Fall that the linear model promised.
+    promised: f64,
+}
+
+/// The normal equations at a point, priors included.
+struct Normal {
+    a: DMatrix<f64>,
+    b: DVector<f64>,
+}
+
+/// The parameters that a set frees, with their priors about the reference.
+struct Free {
+    params: Vec<P>,
+    sigma: Vec<f64>,
+    /// Those of them that are shapes: they move by a few secant steps at once.
+    shapes: Vec<P>,
+    /// Places of those of the member that came last, if others were there before.
+    newest: Vec<usize>,
+    zero: Theta,
+}
+
+impl Free {
+    fn of(set: &[usize], zero: Theta) -> Self {
+        let params: Vec<P> =
+            set.iter().flat_map(|h| CATALOGUE[*h].params()).filter(|p| !p.is_switch()).collect();
+        let newest = match set {
+            [_, .., last] => {
+                let own = |j: &usize| CATALOGUE[*last].params().any(|p| p == params[*j]);
+                (0..params.len()).filter(own).collect()
+            }
+            _ => Vec::new(),
+        };
+        let shapes = set.iter().flat_map(|h| CATALOGUE[*h].shapes).copied().collect();
+        Self { sigma: prior(&params), params, shapes, newest, zero }
+    }
+
+    fn deviation(&self, p: P, theta: &Theta) -> f64 {
+        theta[p as usize] - self.zero[p as usize]
+    }
+
+    /// Squared residual and prior.
+    fn cost(&self, norm: f64, theta: &Theta) -> f64 {
+        let priors = self.params.iter().zip(&self.sigma);
+        norm + priors.map(|(p, s)| (self.deviation(*p, theta) / s).powi(2)).sum::<f64>()
+    }
+
+    fn normal(&self, gram: &Gram, theta: &Theta) -> Normal {
+        let (mut a, mut b, _) = gram.sum(|_| true);
+        for (j, (p, s)) in self.params.iter().zip(&self.sigma).enumerate() {
+            a[(j, j)] += 1.0 / (s * s);
+            b[j] -= self.deviation(*p, theta) / (s * s);
+        }
+        Normal { a, b }
+    }
+
+    /// A step whose shapes move no further than their secants serve.
+    fn limited(&self, mut step: DVector<f64>) -> DVector<f64> {
+        for (p, d) in self.params.iter().zip(step.iter_mut()) {
+            if self.shapes.contains(p) {
+                let most = SHAPE_STEPS * p.spec().step;
+                *d = d.clamp(-most, most);
+            }
+        }
+        step
+    }
+
+    /// `factor` of a step from `theta`, within the bounds.
+    fn moved(&self, theta: &Theta, step: &DVector<f64>, factor: f64) -> Theta {
+        let mut to = *theta;
+        for (p, d) in self.params.iter().zip(step.iter()) {
+            let (s, i) = (p.spec(), *p as usize);
+            to[i] = (to[i] + factor * d).clamp(self.zero[i] + s.lo, self.zero[i] + s.hi);
+        }
+        to
+    }
+}
+
+/// Where a fit stands.
+struct Standing {
+    theta: Theta,
+    cost: f64,
+    gram: Gram,
+    chi: [f64; MODULES],
+    /// Where and along what the sensitivities were taken: they serve as long as steps do what they
+    /// promise.
+    from: Theta,
+    along: Vec<Direction>,
+}
 
 impl Problem<'_> {
     /// Fits the parameters of a set by Gauss-Newton with step halving, from `start`.
     pub(crate) fn fit(&self, set: &[usize], start: &Theta, zero_norm: f64) -> Option<Fit> {
-        let zero = self.reference.theta;
-        let free: Vec<P> =
-            set.iter().flat_map(|h| CATALOGUE[*h].params()).filter(|p| !p.is_switch()).collect();
-        let shapes: Vec<P> = set.iter().flat_map(|h| CATALOGUE[*h].shapes).copied().collect();
-        let sigma = prior(&free);
-        let cost = |norm: f64, t: &Theta| {
-            norm + free
-                .iter()
-                .zip(&sigma)
-                .map(|(p, s)| ((t[*p as usize] - zero[*p as usize]) / s).powi(2))
-                .sum::<f64>()
-        };
-        let mut theta = *start;
-        // Where the sensitivities were taken: they serve as long as steps do what they promise.
-        let (mut from, mut along) = (theta, directions(&free, &theta));
-        let (mut gram, mut chi) = self.gram(&theta, &along);
-        let last = set.last().map(|h| &CATALOGUE[*h]);
-        let newest: Vec<usize> = match last {
-            Some(h) if set.len() > 1 => {
-                (0..free.len()).filter(|j| h.params().any(|p| p == free[*j])).collect()
-            }
-            _ => Vec::new(),
-        };
-        let began = cost(gram.sum(|_| true).2, &theta);
-        let mut best = began;
-        for _ in 0..8 {
-            if free.is_empty() {
-                break;
-            }
-            let (mut a, mut b, _) = gram.sum(|_| true);
-            for (j, (p, s)) in free.iter().zip(&sigma).enumerate() {
-                a[(j, j)] += 1.0 / (s * s);
-                b[j] -= (theta[*p as usize] - zero[*p as usize]) / (s * s);
-            }
-            let limited = |mut step: DVector<f64>| {
-                for (p, d) in free.iter().zip(step.iter_mut()).filter(|(p, _)| shapes.contains(p)) {
-                    let most = SHAPE_STEPS * p.spec().step;
-                    *d = d.clamp(-most, most);
-                }
-                step
-            };
-            let after = |step: &DVector<f64>, factor: f64| -> Step {
-                let mut t = theta;
-                for (p, d) in free.iter().zip(step.iter()) {
-                    let (s, i) = (p.spec(), *p as usize);
-                    t[i] = (t[i] + factor * d).clamp(zero[i] + s.lo, zero[i] + s.hi);
-                }
-                let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
-                let curve = (&a * step).dot(step);
-                (t, best - c, 2.0 * factor * b.dot(step) - factor * factor * curve)
-            };
-            let step = limited(a.clone().cholesky()?.solve(&b));
-            let tried = [1.0, 0.35, 0.12, 0.043].iter().map(|f| after(&step, *f));
-            let mut found: Option<Step> = tried.into_iter().find(|s| s.1 > 0.0);
-            let promised = b.dot(&step);
-            if found.is_none_or(|s| s.1 < BROKEN_PROMISE * promised) && !newest.is_empty() {
-                // The others stand at a kink of theirs, where no common step helps.
-                let (a, b) = (evidence::sub(&a, &newest), evidence::pick(&b, &newest));
-                let own = a.cholesky()?.solve(&b);
-                let mut alone = DVector::zeros(free.len());
-                newest.iter().zip(own.iter()).for_each(|(j, d)| alone[*j] = *d);
-                let alone = after(&limited(alone), 1.0);
-                if alone.1 > found.map_or(0.0, |s| s.1) {
-                    found = Some(alone);
-                }
-            }
-            let Some((t, improved, promised)) = found else { break };
-            (theta, best) = (t, best - improved);
-            if (improved - promised).abs() > KEPT_PROMISE * promised {
-                (from, along) = (theta, directions(&free, &theta));
-            }
-            (gram, chi) = self.gram_along(&theta, &from, &along);
-            if improved < 0.3 + 1e-5 * (began - best) {
+        let free = Free::of(set, self.reference.theta);
+        let along = directions(&free.params, start);
+        let (gram, chi) = self.gram(start, &along);
+        let began = free.cost(gram.sum(|_| true).2, start);
+        let mut at = Standing { theta: *start, cost: began, gram, chi, from: *start, along };
+        let most = if free.params.is_empty() { 0 } else { MOST_STEPS };
+        for _ in 0..most {
+            let Some(step) = self.best_step(&free, &at)? else { break };
+            self.advance(&free, &mut at, &step);
+            if step.improved < 0.3 + 1e-5 * (began - at.cost) {
                 break;
             }
         }
-        let (a, _, norm) = gram.sum(|_| true);
-        let k = free.len();
+        self.fitted(set, free, at, zero_norm)
+    }
+
+    /// The common step with halving, or the newest member's alone where that leads further; none
+    /// where nothing improves. The outer `None`: the normal equations cannot be solved.
+    fn best_step(&self, free: &Free, at: &Standing) -> Option<Option<Step>> {
+        let Normal { a, b } = free.normal(&at.gram, &at.theta);
+        let tried = |step: &DVector<f64>, factor: f64| {
+            let to = free.moved(&at.theta, step, factor);
+            let cost = free.cost(self.gram(&to, &[]).0.sum(|_| true).2, &to);
+            let curve = (&a * step).dot(step);
+            let promised = 2.0 * factor * b.dot(step) - factor * factor * curve;
+            Step { to, improved: at.cost - cost, promised }
+        };
+        let step = free.limited(a.clone().cholesky()?.solve(&b));
+        let mut found =
+            HALVINGS.iter().map(|factor| tried(&step, *factor)).find(|s| s.improved > 0.0);
+        let poor = found.is_none_or(|s| s.improved < BROKEN_PROMISE * b.dot(&step));
+        if poor && !free.newest.is_empty() {
+            // The others stand at a kink of theirs, where no common step helps.
+            let (own_a, own_b) =
+                (evidence::sub(&a, &free.newest), evidence::pick(&b, &free.newest));
+            let own = own_a.cholesky()?.solve(&own_b);
+            let mut alone = DVector::zeros(free.params.len());
+            free.newest.iter().zip(own.iter()).for_each(|(j, d)| alone[*j] = *d);
+            let alone = tried(&free.limited(alone), 1.0);
+            if alone.improved > found.map_or(0.0, |s| s.improved) {
+                found = Some(alone);
+            }
+        }
+        Some(found)
+    }
+
+    /// Takes a step; sensitivities are taken anew where it did not do what it promised.
+    fn advance(&self, free: &Free, at: &mut Standing, step: &Step) {
+        at.theta = step.to;
+        at.cost -= step.improved;
+        if (step.improved - step.promised).abs() > KEPT_PROMISE * step.promised {
+            (at.from, at.along) = (at.theta, directions(&free.params, &at.theta));
+        }
+        (at.gram, at.chi) = self.gram_along(&at.theta, &at.from, &at.along);
+    }
+
+    /// Evidence and covariance where a fit has ended (Laplace).
+    fn fitted(&self, set: &[usize], free: Free, at: Standing, zero_norm: f64) -> Option<Fit> {
+        let (a, _, norm) = at.gram.sum(|_| true);
+        let (k, sigma) = (free.params.len(), &free.sigma);
         let scaled = DMatrix::from_fn(k, k, |i, j| {
             sigma[i] * a[(i, j)] * sigma[j] + if i == j { 1.0 } else { 0.0 }
         });
@@ -139,9 +218,16 @@ impl Problem<'_> {
         let log_det: f64 = 2.0 * (0..k).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
         let inverse = chol.inverse();
         let covariance = DMatrix::from_fn(k, k, |i, j| sigma[i] * inverse[(i, j)] * sigma[j]);
-        let log_z = 0.5 * (zero_norm - best) - 0.5 * log_det;
         let zero = self.chi_at_reference();
-        let explained = core::array::from_fn(|m| 0.5 * (zero[m] - chi[m]));
-        Some(Fit { set: set.to_vec(), theta, log_z, free, covariance, gram, norm, explained })
+        Some(Fit {
+            set: set.to_vec(),
+            theta: at.theta,
+            log_z: 0.5 * (zero_norm - at.cost) - 0.5 * log_det,
+            free: free.params,
+            covariance,
+            gram: at.gram,
+            norm,
+            explained: core::array::from_fn(|m| 0.5 * (zero[m] - at.chi[m])),
+        })
     }
 }

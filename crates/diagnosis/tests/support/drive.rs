@@ -4,7 +4,7 @@ use diagnosis::Drive;
 use rand_chacha::ChaCha8Rng;
 
 use super::bodies::{Bodies, State};
-use super::driver::Driver;
+use super::driver::{Driver, View};
 use super::effects::{self, Acting, Effect, Memory, Now};
 use super::engine::Drivetrain;
 use super::logger::{LOGGED, log, smooth};
@@ -99,7 +99,8 @@ pub(crate) fn drive(
         let air_degc = setting.air_degc - 0.0065 * (altitude - setting.altitude_m);
         let air_pa = 101_325.0 * (1.0 - 2.255_77e-5 * altitude).powf(5.2559);
         let density = air_pa / (287.05 * (air_degc + 273.15));
-        driver.act(&road, place, v, grade * mass * G, heading - course, offset, rng, STEP_S);
+        let view = View { place, v, climb_n: grade * mass * G, aside: heading - course, offset };
+        driver.act(&road, &view, rng, STEP_S);
         let now = Now {
             time_s,
             place_m: place,

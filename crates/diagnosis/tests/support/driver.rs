@@ -26,6 +26,17 @@ pub(crate) struct Driver {
     gain: f64,
 }
 
+/// What a driver sees: the truck is at `place` with speed `v`, `climb_n` pulls it back, it points
+/// `aside` of the road's direction and is `offset` to the left of the lane's middle.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct View {
+    pub(crate) place: f64,
+    pub(crate) v: f64,
+    pub(crate) climb_n: f64,
+    pub(crate) aside: f64,
+    pub(crate) offset: f64,
+}
+
 impl Driver {
     /// A driver who uses the engine brake up to `most_stage`.
     pub(crate) fn new(most_stage: f64, rng: &mut ChaCha8Rng) -> Self {
@@ -48,19 +59,9 @@ impl Driver {
         }
     }
 
-    /// One step: the truck is at `place` with speed `v`, `climb_n` pulls it back, it points `aside`
-    /// of the road's direction and is `offset` to the left of the lane's middle.
-    pub(crate) fn act(
-        &mut self,
-        road: &Road,
-        place: f64,
-        v: f64,
-        climb_n: f64,
-        aside: f64,
-        offset: f64,
-        rng: &mut ChaCha8Rng,
-        dt: f64,
-    ) {
+    /// One step with what the driver sees.
+    pub(crate) fn act(&mut self, road: &Road, view: &View, rng: &mut ChaCha8Rng, dt: f64) {
+        let View { place, v, climb_n, aside, offset } = *view;
         if self.tick.is_multiple_of(20) {
             self.wanted = road.wanted(place, self.decel);
         }

@@ -33,22 +33,228 @@ pub enum Carriageway {
     Backward,
 }
 
-enum Format {
-    Own,
-    Mapped,
-    Ngsim,
-    HighD,
+/// A way to write trajectories.
+struct Dialect {
+    /// Columns that tell it.
+    told_by: &'static [&'static str],
+    frame: Frame,
+    names: Names,
+    /// From a row as it is written to one in metres, seconds and left-hand offsets; none for a row
+    /// that is not kept.
+    row: fn(Row, Carriageway) -> Option<Row>,
+    /// Stations are counted from the first one seen.
+    from_zero: bool,
 }
 
-struct Columns<'a> {
-    header: &'a ::csv::StringRecord,
+/// Names under which a dialect knows a field; without a name it has none.
+#[derive(Clone, Copy)]
+struct Names {
+    id: &'static [&'static str],
+    time: &'static [&'static str],
+    x: &'static [&'static str],
+    y: &'static [&'static str],
+    yaw: &'static [&'static str],
+    speed: &'static [&'static str],
+    length: &'static [&'static str],
+    width: &'static [&'static str],
+    class: &'static [&'static str],
 }
 
-impl Columns<'_> {
-    fn find(&self, names: &[&str]) -> Option<usize> {
-        self.header.iter().position(|column| {
+const NO_NAMES: Names = Names {
+    id: &[],
+    time: &[],
+    x: &[],
+    y: &[],
+    yaw: &[],
+    speed: &[],
+    length: &[],
+    width: &[],
+    class: &[],
+};
+
+/// The first whose columns are there; the last is told by nothing.
+const DIALECTS: [Dialect; 4] = [
+    Dialect {
+        told_by: &["Local_X", "Frame_ID"],
+        frame: Frame::Road,
+        names: Names {
+            id: &["Vehicle_ID"],
+            time: &["Frame_ID"],
+            x: &["Local_Y"],
+            y: &["Local_X"],
+            speed: &["v_Vel"],
+            length: &["v_Length"],
+            width: &["v_Width"],
+            class: &["v_Class"],
+            ..NO_NAMES
+        },
+        row: ngsim,
+        from_zero: false,
+    },
+    Dialect {
+        told_by: &["xVelocity", "frame"],
+        frame: Frame::Road,
+        names: Names {
+            id: &["id"],
+            time: &["frame"],
+            x: &["x"],
+            y: &["y"],
+            speed: &["xVelocity"],
+            length: &["width"],
+            width: &["height"],
+            class: &["class"],
+            ..NO_NAMES
+        },
+        row: highd,
+        from_zero: true,
+    },
+    Dialect {
+        told_by: &["frame", "vehicle"],
+        frame: Frame::Map,
+        names: Names { id: &["vehicle"], time: &["frame"], x: &["x"], y: &["y"], ..NO_NAMES },
+        row: mapped,
+        from_zero: false,
+    },
+    Dialect {
+        told_by: &[],
+        frame: Frame::Map,
+        names: Names {
+            id: &["id", "vehicle_id"],
+            time: &["time_s", "t_s", "t"],
+            x: &["x_m", "x"],
+            y: &["y_m", "y"],
+            yaw: &["yaw_rad", "heading_rad", "heading"],
+            speed: &["speed_m_s", "v_mps", "v"],
+            length: &["length_m", "length"],
+            width: &["width_m", "width"],
+            class: &["class", "type"],
+        },
+        row: |row, _| Some(row),
+        from_zero: false,
+    },
+];
+
+fn mapped(row: Row, _: Carriageway) -> Option<Row> {
+    Some(Row { time_s: row.time_s / NGSIM_HZ, ..row })
+}
+
+/// `Local_Y` is the front's way along the road, `Local_X` the way to the right.
+fn ngsim(row: Row, _: Carriageway) -> Option<Row> {
+    let metres = |feet: Option<f64>| feet.map(|f| f * FOOT_M);
+    let length_m = metres(row.length_m);
+    Some(Row {
+        time_s: row.time_s / NGSIM_HZ,
+        x_m: row.x_m * FOOT_M - 0.5 * length_m.unwrap_or(0.0),
+        y_m: -row.y_m * FOOT_M,
+        yaw_rad: Some(0.0),
+        speed_m_s: metres(row.speed_m_s),
+        width_m: metres(row.width_m),
+        length_m,
+        ..row
+    })
+}
+
+fn highd(row: Row, carriageway: Carriageway) -> Option<Row> {
+    let forward = row.speed_m_s.unwrap_or(0.0) >= 0.0;
+    if forward != (carriageway == Carriageway::Forward) {
+        return None;
+    }
+    let x = row.x_m + 0.5 * row.length_m.unwrap_or(0.0);
+    let y = row.y_m + 0.5 * row.width_m.unwrap_or(0.0);
+    let (x_m, y_m) = if forward { (x, -y) } else { (-x, y) };
+    Some(Row {
+        time_s: row.time_s / HIGHD_HZ,
+        x_m,
+        y_m,
+        yaw_rad: Some(0.0),
+        speed_m_s: row.speed_m_s.map(f64::abs),
+        ..row
+    })
+}
+
+/// A dialect's field in a file: where it stands, and its names for messages.
+struct Field {
+    names: &'static [&'static str],
+    at: Option<usize>,
+}
+
+impl Field {
+    fn of(header: &::csv::StringRecord, names: &'static [&'static str]) -> Self {
+        let at = header.iter().position(|column| {
             let column = column.trim().trim_start_matches('\u{feff}');
             names.iter().any(|name| column.eq_ignore_ascii_case(name))
+        });
+        Self { names, at }
+    }
+
+    fn text<'r>(&self, record: &'r ::csv::StringRecord) -> Option<&'r str> {
+        self.at.and_then(|at| record.get(at)).filter(|text| !text.is_empty())
+    }
+
+    /// # Errors
+    /// What is wrong with the value, without its line.
+    fn number(&self, record: &::csv::StringRecord) -> Result<Option<f64>, String> {
+        let Some(text) = self.text(record) else { return Ok(None) };
+        match text.parse::<f64>() {
+            Ok(x) if x.is_finite() => Ok(Some(x)),
+            _ => Err(format!(", column {}: `{text}`", self.names.join("/"))),
+        }
+    }
+
+    fn needed(&self, record: &::csv::StringRecord) -> Result<f64, String> {
+        self.number(record)?.ok_or_else(|| format!(": no {}", self.names.join("/")))
+    }
+}
+
+/// A dialect's fields in a file.
+struct Fields {
+    id: Field,
+    time: Field,
+    x: Field,
+    y: Field,
+    yaw: Field,
+    speed: Field,
+    length: Field,
+    width: Field,
+    class: Field,
+}
+
+impl Fields {
+    /// # Errors
+    /// The name of the column that is missing.
+    fn of(header: &::csv::StringRecord, names: &Names) -> Result<Self, String> {
+        let field = |names| Field::of(header, names);
+        let fields = Self {
+            id: field(names.id),
+            time: field(names.time),
+            x: field(names.x),
+            y: field(names.y),
+            yaw: field(names.yaw),
+            speed: field(names.speed),
+            length: field(names.length),
+            width: field(names.width),
+            class: field(names.class),
+        };
+        for needed in [&fields.id, &fields.time, &fields.x, &fields.y] {
+            if needed.at.is_none() {
+                return Err(format!("no column {}", needed.names.join(" or ")));
+            }
+        }
+        Ok(fields)
+    }
+
+    /// A row as it is written, in the dialect's own units.
+    fn read(&self, record: &::csv::StringRecord) -> Result<Row, String> {
+        Ok(Row {
+            id: self.id.needed(record)? as u64,
+            time_s: self.time.needed(record)?,
+            x_m: self.x.needed(record)?,
+            y_m: self.y.needed(record)?,
+            yaw_rad: self.yaw.number(record)?,
+            speed_m_s: self.speed.number(record)?,
+            length_m: self.length.number(record)?,
+            width_m: self.width.number(record)?,
+            class: self.class.text(record).and_then(class),
         })
     }
 }
@@ -69,133 +275,23 @@ pub fn read_csv(
         .trim(::csv::Trim::All)
         .from_reader(text);
     let header = reader.headers().map_err(|e| bad(e.to_string()))?.clone();
-    let columns = Columns { header: &header };
-    let has = |column: &str| columns.find(&[column]).is_some();
-    let format = if has("Local_X") && has("Frame_ID") {
-        Format::Ngsim
-    } else if has("xVelocity") && has("frame") {
-        Format::HighD
-    } else if has("frame") && has("vehicle") {
-        Format::Mapped
-    } else {
-        Format::Own
+    let told = |d: &&Dialect| {
+        d.told_by.iter().all(|c| Field::of(&header, core::slice::from_ref(c)).at.is_some())
     };
-    // Names of: vehicle, time, x, y, yaw, speed, length, width, class.
-    let (names, frame): ([&[&str]; 9], Frame) = match format {
-        Format::Own => (
-            [
-                &["id", "vehicle_id"],
-                &["time_s", "t_s", "t"],
-                &["x_m", "x"],
-                &["y_m", "y"],
-                &["yaw_rad", "heading_rad", "heading"],
-                &["speed_m_s", "v_mps", "v"],
-                &["length_m", "length"],
-                &["width_m", "width"],
-                &["class", "type"],
-            ],
-            Frame::Map,
-        ),
-        Format::Mapped => {
-            ([&["vehicle"], &["frame"], &["x"], &["y"], &[], &[], &[], &[], &[]], Frame::Map)
-        }
-        Format::Ngsim => (
-            [
-                &["Vehicle_ID"],
-                &["Frame_ID"],
-                &["Local_Y"],
-                &["Local_X"],
-                &[],
-                &["v_Vel"],
-                &["v_Length"],
-                &["v_Width"],
-                &["v_Class"],
-            ],
-            Frame::Road,
-        ),
-        Format::HighD => (
-            [
-                &["id"],
-                &["frame"],
-                &["x"],
-                &["y"],
-                &[],
-                &["xVelocity"],
-                &["width"],
-                &["height"],
-                &["class"],
-            ],
-            Frame::Road,
-        ),
-    };
-    let at = names.map(|list| columns.find(list));
-    for (k, list) in names.iter().enumerate().take(4) {
-        if at[k].is_none() {
-            return Err(bad(format!("no column {}", list.join(" or "))));
-        }
-    }
+    let [.., own] = &DIALECTS;
+    let dialect = DIALECTS.iter().find(told).unwrap_or(own);
+    let fields = Fields::of(&header, &dialect.names).map_err(bad)?;
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| bad(e.to_string()))?;
         let line = record.position().map_or(0, ::csv::Position::line);
-        let field = |k: usize| at[k].and_then(|c| record.get(c)).filter(|text| !text.is_empty());
-        let number = |k: usize| -> Result<Option<f64>, ReplayError> {
-            let Some(text) = field(k) else { return Ok(None) };
-            match text.parse::<f64>() {
-                Ok(x) if x.is_finite() => Ok(Some(x)),
-                _ => Err(bad(format!("line {line}, column {}: `{text}`", names[k].join("/")))),
-            }
-        };
-        let need = |k: usize| {
-            number(k)?.ok_or_else(|| bad(format!("line {line}: no {}", names[k].join("/"))))
-        };
-        let id = need(0)? as u64;
-        let (time, x, y) = (need(1)?, need(2)?, need(3)?);
-        let (length, width) = (number(6)?, number(7)?);
-        let mut row = Row {
-            id,
-            time_s: time,
-            x_m: x,
-            y_m: y,
-            yaw_rad: number(4)?,
-            speed_m_s: number(5)?,
-            length_m: length,
-            width_m: width,
-            class: field(8).and_then(class),
-        };
-        match format {
-            Format::Own => {}
-            Format::Mapped => {
-                row.time_s = time / NGSIM_HZ;
-            }
-            Format::Ngsim => {
-                row.length_m = length.map(|l| l * FOOT_M);
-                row.width_m = width.map(|w| w * FOOT_M);
-                row.time_s = time / NGSIM_HZ;
-                // Local_Y is the front's way along the road, Local_X the way to the right.
-                row.x_m = x * FOOT_M - 0.5 * row.length_m.unwrap_or(0.0);
-                row.y_m = -y * FOOT_M;
-                row.speed_m_s = row.speed_m_s.map(|v| v * FOOT_M);
-                row.yaw_rad = Some(0.0);
-            }
-            Format::HighD => {
-                let forward = row.speed_m_s.unwrap_or(0.0) >= 0.0;
-                if forward != (carriageway == Carriageway::Forward) {
-                    continue;
-                }
-                row.time_s = time / HIGHD_HZ;
-                let (cx, cy) = (x + 0.5 * length.unwrap_or(0.0), y + 0.5 * width.unwrap_or(0.0));
-                (row.x_m, row.y_m) = if forward { (cx, -cy) } else { (-cx, cy) };
-                row.speed_m_s = row.speed_m_s.map(f64::abs);
-                row.yaw_rad = Some(0.0);
-            }
-        }
-        rows.push(row);
+        let written = fields.read(&record).map_err(|why| bad(format!("line {line}{why}")))?;
+        rows.extend((dialect.row)(written, carriageway));
     }
-    if let Format::HighD = format {
+    if dialect.from_zero {
         shift_to_zero(&mut rows);
     }
-    Ok((frame, rows))
+    Ok((dialect.frame, rows))
 }
 
 /// Moves stations so that the first is zero.
