@@ -223,6 +223,52 @@ fn a_sumo_that_is_killed_is_a_typed_error_or_the_native_engine_goes_on() {
     }
 }
 
+/// `on_failure = "native"` was of no use where SUMO was not installed, or another program had its
+/// name: the run ended before it began.
+#[test]
+fn without_a_sumo_the_native_engine_drives_where_it_may_and_says_what_was_tried() {
+    for (binary, said) in [("/nowhere/sumo", "/nowhere/sumo"), ("/bin/true", "not SUMO, printed")] {
+        let mut s = scenario(TrafficKind::Sumo, None, 20.0);
+        s.traffic.sumo.binary = Some(binary.to_owned());
+        let e = World::new(&s, 4).err().unwrap().to_string();
+        assert!(e.contains(binary) && e.contains(said), "{e}");
+        s.traffic.on_failure = OnFailure::Native;
+        let (summary, world) = run(&s, 4);
+        assert!(summary.collisions == 0 && summary.distance_m > 100.0, "{summary:?}");
+        let why = world.traffic().failure().unwrap();
+        assert!(why.contains(binary) && why.contains(said), "{why}");
+        assert!(world.traffic().manifest().engine.starts_with("native"));
+    }
+}
+
+/// 1 of 5 runs whose SUMO failed at its start ended in a collision, and 2 of 6 whose SUMO failed
+/// later.
+#[test]
+fn whenever_sumo_fails_nobody_touches_the_truck_afterwards() {
+    if !has_sumo() {
+        return;
+    }
+    let mut base = scenario(TrafficKind::Sumo, None, 40.0);
+    base.traffic.on_failure = OnFailure::Native;
+    for seed in 1..=6 {
+        let mut s = base.clone();
+        s.traffic.sumo.options = vec!["--no-such-option".to_owned()];
+        let (summary, world) = run(&s, seed);
+        assert_eq!(summary.collisions, 0, "at the start, seed {seed}");
+        assert!(world.traffic().failure().unwrap().contains("no-such-option"));
+
+        let mut world = World::new(&base, seed).unwrap();
+        while world.now().seconds() < 4.0 + 1.7 * seed as f64 {
+            world.tick(&mut ()).unwrap();
+        }
+        let pid = world.traffic_mut().sumo_mut().unwrap().pid().unwrap();
+        let kill = std::process::Command::new("kill").args(["-9", &pid.to_string()]).status();
+        assert!(kill.unwrap().success());
+        assert_eq!(world.run(&mut ()).unwrap().collisions, 0, "later, seed {seed}");
+        assert!(world.traffic().failure().is_some());
+    }
+}
+
 #[test]
 fn a_copy_of_a_world_in_sumo_traffic_says_why_it_cannot_go_on() {
     if !has_sumo() {

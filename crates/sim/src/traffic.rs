@@ -116,10 +116,18 @@ impl Traffic {
                 for file in &section.sumo.additional_files {
                     input(&format!("file {}", base_name(file)), file_fingerprint(file.as_ref())?);
                 }
-                Engine::sumo(scenario, demand, road, geometry, folder)?
+                match Engine::sumo(scenario, demand.clone(), road, geometry, folder) {
+                    Err(SimError::Traffic(TrafficError::Sumo(why)))
+                        if section.on_failure == OnFailure::Native =>
+                    {
+                        let native = NativeTraffic::new(Arc::clone(road), geometry, demand)?;
+                        Engine::Native(Box::new(native), Some(why.to_string()))
+                    }
+                    engine => engine?,
+                }
             }
         };
-        inputs.engine = engine.name()?;
+        inputs.engine = engine.name();
         let hashed = match expected {
             Some(expected) => Hashed::verify(engine, inputs, expected)?,
             None => Hashed::record(engine, inputs),
@@ -214,14 +222,14 @@ impl Engine {
     }
 
     /// Name and version.
-    fn name(&self) -> Result<String, TrafficError> {
-        Ok(match self {
+    fn name(&self) -> String {
+        match self {
             Self::None(_) => "none".to_owned(),
             Self::Native(..) => format!("native {}", env!("CARGO_PKG_VERSION")),
             Self::Replay(_) => format!("replay {}", env!("CARGO_PKG_VERSION")),
-            Self::Sumo(sumo) => sumo.traffic.programs().version()?,
+            Self::Sumo(sumo) => sumo.traffic.programs().version.clone(),
             Self::Detached => "SUMO".to_owned(),
-        })
+        }
     }
 }
 
@@ -235,9 +243,13 @@ impl TrafficSource for Engine {
             let (Some(config), TrafficError::Sumo(_)) = (sumo.fallback.clone(), &error) else {
                 return Err(error);
             };
-            let scene = sumo.traffic.last_scene();
-            let road = Arc::clone(&sumo.road);
-            let native = NativeTraffic::take_over(road, sumo.geometry, config, scene)?;
+            let (road, geometry) = (Arc::clone(&sumo.road), sumo.geometry);
+            let native = if sumo.traffic.has_shown() {
+                let scene = sumo.traffic.last_scene();
+                NativeTraffic::take_over(road, geometry, config, scene, ego, now)?
+            } else {
+                NativeTraffic::new(road, geometry, config)?
+            };
             *self = Self::Native(Box::new(native), Some(error.to_string()));
         }
         match self {

@@ -12,6 +12,7 @@ mod perception;
 mod philox;
 pub mod replay;
 mod search;
+pub mod serve;
 pub mod stats;
 pub mod sumo;
 

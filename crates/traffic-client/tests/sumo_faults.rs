@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use traffic_client::sumo::codec::{Value, Writer};
 use traffic_client::sumo::session::{Answer, id, var};
-use traffic_client::sumo::{Link, SumoError, Timeouts};
+use traffic_client::sumo::{Link, Programs, SumoError, Timeouts};
 
 const QUICK: Timeouts = Timeouts { startup_s: 5.0, answer_s: 0.3 };
 
@@ -207,4 +207,29 @@ fn a_refused_command_does_not_spoil_the_rest_of_the_batch_or_the_link() {
     let e = link.session.refusal("x").unwrap();
     assert!(!e.is_fatal() && e.to_string().contains("not known"), "{e}");
     assert!(!link.is_poisoned());
+}
+
+/// A program that is not SUMO was started, waited for and left unnamed.
+#[test]
+fn a_program_that_is_not_sumo_is_named_with_what_it_printed() {
+    let folder = std::env::temp_dir().join(format!("tractrix-{}-not-sumo", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("sumo");
+    for (script, said) in [
+        ("#!/bin/sh\nexec /bin/echo I am a calendar\n", "`I am a calendar`"),
+        ("#!/bin/sh\necho no such library >&2; exit 127\n", "`no such library`"),
+        ("#!/bin/sh\nexit 3\n", "printed nothing"),
+    ] {
+        std::fs::write(&file, script).unwrap();
+        let runs = std::os::unix::fs::PermissionsExt::from_mode(0o755);
+        std::fs::set_permissions(&file, runs).unwrap();
+        let e = Programs::find(Some(&file)).unwrap_err().to_string();
+        assert!(e.contains(&file.display().to_string()) && e.contains("eclipse-sumo"), "{e}");
+        assert!(e.contains(said), "{e}");
+    }
+    for (program, said) in [("/bin/true", "GNU"), ("/bin/sh", "printed")] {
+        let e = Programs::find(Some(std::path::Path::new(program))).unwrap_err().to_string();
+        assert!(e.contains(program) && e.contains(said), "{e}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
 }

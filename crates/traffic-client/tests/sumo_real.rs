@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use driver_models::Idm;
 use road::{Road, builtin};
 use tractrix_core::{EgoState, Geometry, Neighbour, Scene, Time, TrafficSource};
 use traffic_client::TrafficError;
@@ -197,6 +198,53 @@ fn the_ghost_makes_a_follower_brake_before_the_centre_of_the_ego_crosses_the_lin
     }
     let (_, accel) = reacted.expect("nobody slowed down behind the overlapping ego");
     assert!(accel > -8.0, "emergency braking: {accel}");
+}
+
+/// A truck that was put in stood still for its first step as SUMO had it: followers at 47 to 64 m
+/// braked with 8 m/s², where the law of car following asks for 2.5.
+#[test]
+fn who_stands_in_for_the_ego_has_its_speed_from_the_first_step() {
+    if !sumo_is_here() {
+        return;
+    }
+    let folder = Folder::new("first-step");
+    let mut followers = 0;
+    let traffic = TrafficConfig::family(Density::Dense, 25.0, 1);
+    let (road, mut sumo) = flat_traffic(&folder, traffic.clone());
+    let (right, left) = (road.lanes()[0].center_d_m(0.0), road.lanes()[1].center_d_m(0.0));
+    for seed in 1..=12 {
+        sumo.reset(seed).unwrap();
+        for k in 0..60 {
+            // From the fourth second on it reaches into the left lane: the ghost comes in, too.
+            let d = right + if k > 40 { 0.4 * (left - right) } else { 0.0 };
+            let ego = ego_at(&road, 1000.0 + 2.0 * f64::from(k), d, 20.0);
+            let lanes = if k > 40 { 2 } else { 1 };
+            let scene = sumo.advance(Time(i64::from(k) * 100_000_000), &ego).unwrap();
+            if !(k < 5 || (41..46).contains(&k)) {
+                continue;
+            }
+            let rear_m = ego.s_m - 11.2;
+            for lane in 0..lanes {
+                let behind = scene.neighbours.iter().rev();
+                let mut behind = behind.filter(|n| n.lane == lane && n.front_s_m < rear_m);
+                let Some(n) = behind.next().filter(|n| rear_m - n.front_s_m < 100.0) else {
+                    continue;
+                };
+                let c = traffic.class(n.class);
+                let idm = Idm::new(25.0, c.headway_s, c.min_gap_m, c.accel_m_s2, c.decel_m_s2, 9.0);
+                let law = idm.accel_m_s2(
+                    n.speed_m_s - n.accel_m_s2 * 0.1,
+                    25.0,
+                    rear_m - n.front_s_m,
+                    n.speed_m_s - 20.0,
+                );
+                // SUMO puts the lower of several laws in force: a driver above the limit slows, too.
+                assert!(n.accel_m_s2 > law.min(0.0) - 2.0, "seed {seed}, step {k}: {n:?}, {law}");
+                followers += 1;
+            }
+        }
+    }
+    assert!(followers > 10, "{followers}");
 }
 
 #[test]

@@ -160,6 +160,7 @@ impl Engine {
             .is_some_and(|a| a.tick <= self.state.tick)
         {
             late.push(self.state.next_arrival);
+            self.state.arrived += 1;
             self.state.next_arrival += 1;
         }
         late.retain(|&k| {

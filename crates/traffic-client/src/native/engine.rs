@@ -41,6 +41,8 @@ pub(crate) struct State {
     pub(crate) next_id: u64,
     /// Arrivals that found no room yet, per lane.
     pub(crate) waiting: Vec<u32>,
+    /// Arrivals at the entries, those that wait included.
+    pub(crate) arrived: u64,
     /// Next arrival of a measured boundary, and those that wait for room.
     pub(crate) next_arrival: usize,
     pub(crate) late: Vec<usize>,
@@ -62,6 +64,7 @@ impl Clone for State {
         self.tick = from.tick;
         self.next_id = from.next_id;
         self.waiting.clone_from(&from.waiting);
+        self.arrived = from.arrived;
         self.next_arrival = from.next_arrival;
         self.late.clone_from(&from.late);
         self.driven_m = from.driven_m;

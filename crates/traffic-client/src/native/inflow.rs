@@ -1,18 +1,11 @@
 //! Where vehicles come from: the first fill of the road, and arrivals at the entries.
 
-use tractrix_core::Scene;
-
 use super::driver::Driver;
 use super::engine::{Engine, TICK_S};
+use super::equilibrium::{critical_speed_m_s, easy_speed_m_s};
 use super::fleet::Fleet;
 use super::lanes::LaneUse;
 use crate::philox::{Draws, Stream};
-
-/// Arrivals that wait for room at one entry, at most.
-const QUEUE: u32 = 50;
-
-/// Room between the vehicles of a scene that is taken over and those of our own, m.
-const SEAM_M: f64 = 60.0;
 
 /// A vehicle of the first fill.
 struct Start {
@@ -25,7 +18,7 @@ struct Start {
 
 impl Engine {
     /// Off-ramps that begin after a station, nearest first.
-    fn exits_after(&self, s_m: f64) -> impl Iterator<Item = u16> {
+    pub(crate) fn exits_after(&self, s_m: f64) -> impl Iterator<Item = u16> {
         let exits = self.map.exits.iter().copied();
         exits.filter(move |&k| self.map.lanes[k as usize].s_start_m > s_m)
     }
@@ -78,35 +71,6 @@ impl Engine {
         }
     }
 
-    /// Puts the vehicles of a scene in the place of those on its stretch. Numbers of vehicles that
-    /// come later are above all of theirs.
-    pub(crate) fn adopt(&mut self, scene: &Scene) {
-        let rears = scene.neighbours.iter().map(|n| n.rear_s_m);
-        let fronts = scene.neighbours.iter().map(|n| n.front_s_m);
-        let from_m = rears.fold(f64::INFINITY, f64::min) - SEAM_M;
-        let to_m = fronts.fold(f64::NEG_INFINITY, f64::max) + SEAM_M;
-        self.state.fleet.retain(|f, i| f.s_m[i] < from_m || f.rear_m(i) > to_m);
-        let first = scene.neighbours.iter().map(|n| n.id + 1).max().unwrap_or(0);
-        for id in &mut self.state.fleet.id {
-            *id += first;
-        }
-        self.state.next_id += first;
-        for n in &scene.neighbours {
-            if usize::from(n.lane) >= self.map.lanes.len() {
-                continue;
-            }
-            let exits = self.exits_after(n.front_s_m);
-            let drawn = Driver::of_class(&self.config, n.id, n.class, exits);
-            let driver = Driver { length_m: n.length_m(), ..drawn };
-            self.state.fleet.insert(n.front_s_m, n.speed_m_s.max(0.0), n.lane, n.id, driver);
-            let target = n.target_lane.filter(|&t| usize::from(t) < self.map.lanes.len());
-            if let Some(target) = target {
-                let i = self.state.fleet.id.iter().position(|&id| id == n.id).unwrap_or(0);
-                self.state.fleet.target[i] = target;
-            }
-        }
-    }
-
     /// Draws this tick's arrivals and lets in whom the traffic has room for.
     pub(crate) fn let_in(&mut self) {
         for k in 0..self.map.lanes.len() {
@@ -120,7 +84,8 @@ impl Engine {
             } * (TICK_S / self.config.spawn_interval_s);
             let draws = Draws::new(self.config.seed, Stream::Arrival, self.state.tick);
             if draws.uniform(k as u32) < probability {
-                self.state.waiting[k] = (self.state.waiting[k] + 1).min(QUEUE);
+                self.state.arrived += 1;
+                self.state.waiting[k] = self.state.waiting[k].saturating_add(1);
             }
             if self.state.waiting[k] > 0 && self.enter(k as u16) {
                 self.state.waiting[k] -= 1;
@@ -128,7 +93,7 @@ impl Engine {
         }
     }
 
-    /// Lets the next vehicle into a lane if nobody has to brake hard for it.
+    /// Lets the next vehicle into a lane if there is room for it.
     fn enter(&mut self, k: u16) -> bool {
         let lane = &self.map.lanes[k as usize];
         let id = self.state.next_id;
@@ -151,29 +116,39 @@ impl Engine {
             _ => None,
         };
         let wished = queued.map_or(desired, |v| v.min(desired));
-        // Out of a queue nobody comes closer than they would follow: otherwise those who come in
-        // would brake, and the head of the queue would wander onto the road. The nearer the speed
-        // is to the desired one, the less of a queue it is, and comfortable braking is right.
-        let least_m_s2 = |v: f64| {
-            let braking = -driver.idm.decel_m_s2;
-            let part = queued.map_or(1.0, |_| v / desired.max(0.1));
-            let part = part * part * part * part;
-            part * braking - (1.0 - part) * driver.idm.free_m_s2(v, desired)
-        };
-        let comfortable = |v: f64| match ahead {
-            None => true,
-            Some((rear_m, speed_m_s)) => {
-                let gap = rear_m - s_m;
-                gap > driver.idm.min_gap_m
-                    && driver.idm.interaction_m_s2(v, gap, v - speed_m_s) > least_m_s2(v)
-            }
-        };
-        let matched = ahead.map_or(wished, |(_, v)| v.min(wished));
-        let Some(v_m_s) = [wished, matched].into_iter().find(|&v| comfortable(v)) else {
+        let Some(v_m_s) = entry_speed_m_s(&driver, wished, desired, s_m, ahead) else {
             return false;
         };
         self.state.fleet.insert(s_m, v_m_s, k, id, driver);
         self.state.next_id += 1;
         true
     }
+}
+
+/// Speed at which a driver comes in behind a leader (station of its rear, m, and speed, m/s);
+/// `None`: they wait for room before the road.
+///
+/// They come in as they would have followed, at the speed that goes with the gap: nobody brakes for
+/// having come in, so that no queue forms on the road that the road does not make itself. Where that
+/// speed would be below the one at which most get through, and below the leader's, they let the gap
+/// grow: out of a queue before the road comes as much as a lane carries.
+fn entry_speed_m_s(
+    driver: &Driver,
+    wished_m_s: f64,
+    desired_m_s: f64,
+    s_m: f64,
+    ahead: Option<(f64, f64)>,
+) -> Option<f64> {
+    let Some((rear_m, leader_m_s)) = ahead else { return Some(wished_m_s) };
+    let (idm, gap_m) = (&driver.idm, rear_m - s_m);
+    if gap_m <= idm.min_gap_m {
+        return None;
+    }
+    let easy_m_s = easy_speed_m_s(idm, desired_m_s, gap_m, leader_m_s).min(wished_m_s);
+    let least_m_s = wished_m_s.min(leader_m_s);
+    if easy_m_s >= least_m_s {
+        return Some(easy_m_s);
+    }
+    let critical_m_s = critical_speed_m_s(idm, desired_m_s, driver.length_m);
+    (easy_m_s >= critical_m_s.min(least_m_s)).then_some(easy_m_s)
 }

@@ -178,6 +178,14 @@ fn flat() -> LaneMap {
     LaneMap::straight(2, 5000.0, 3.75, 30.0)
 }
 
+/// The mean of three seeds: whether and when a queue breaks down is chance.
+fn mean_served_1_h(config: &TrafficConfig, map: &LaneMap, detector_m: f64) -> f64 {
+    let served = |seed| {
+        served_1_h(TrafficConfig { seed, ..config.clone() }, map.clone(), 1800.0, detector_m)
+    };
+    (3..6).map(served).sum::<f64>() / 3.0
+}
+
 /// Vehicles per hour and lane that pass a station between 600 s and the end.
 fn served_1_h(config: TrafficConfig, map: LaneMap, seconds: f64, detector_m: f64) -> f64 {
     drive(config, map, seconds, detector_m).0.per_hour(600.0, seconds) / 2.0
@@ -202,9 +210,9 @@ fn headways_scatter_as_on_roads_and_lane_changes_are_not_undone() {
 fn a_queue_before_an_on_ramp_is_served_nearly_as_fast_as_the_flat_road() {
     // The story: whoever merged stopped at the end of the ramp, those who let him in braked to a
     // halt, and with trucks 28 % of the capacity were lost.
-    let flat = served_1_h(demand(0.2, 2400.0), flat(), 1200.0, 3500.0);
+    let flat = mean_served_1_h(&demand(0.2, 2400.0), &flat(), 3500.0);
     let busy = TrafficConfig { ramp_spawn_probability: 0.025, ..demand(0.2, 1900.0) };
-    let ramp = served_1_h(busy, on_ramp(300.0, 30.0), 1200.0, 3500.0);
+    let ramp = mean_served_1_h(&busy, &on_ramp(300.0, 30.0), 3500.0);
     assert!(ramp > 0.9 * flat, "{ramp} of {flat} per hour and lane");
 }
 
@@ -293,19 +301,12 @@ fn figures() {
         );
     }
     for trucks in [0.0, 0.2] {
-        let mean = |config: TrafficConfig, map: &LaneMap, at_m: f64| {
-            let seeds = 3..6;
-            let served = |seed| {
-                served_1_h(TrafficConfig { seed, ..config.clone() }, map.clone(), 1800.0, at_m)
-            };
-            seeds.map(served).sum::<f64>() / 3.0
-        };
         let ramp = TrafficConfig { ramp_spawn_probability: 0.025, ..demand(trucks, 1900.0) };
         eprintln!(
             "trucks {trucks}, per hour and lane: flat {:.0}, on-ramp {:.0}, lane drop {:.0}",
-            mean(demand(trucks, 2400.0), &flat(), 3500.0),
-            mean(ramp, &on_ramp(300.0, 30.0), 3500.0),
-            mean(demand(trucks, 1900.0), &lane_drop(30.0), 4000.0),
+            mean_served_1_h(&demand(trucks, 2400.0), &flat(), 3500.0),
+            mean_served_1_h(&ramp, &on_ramp(300.0, 30.0), 3500.0),
+            mean_served_1_h(&demand(trucks, 1900.0), &lane_drop(30.0), 4000.0),
         );
     }
 }

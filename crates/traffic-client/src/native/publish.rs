@@ -19,6 +19,17 @@ pub(crate) fn quintic(p: f64) -> (f64, f64) {
     (p2 * p * (10.0 + p * (6.0 * p - 15.0)), 30.0 * p2 * q * q)
 }
 
+/// Fraction of the duration after which this share of a lane change is done: the inverse of
+/// [`quintic`], by bisection.
+pub(crate) fn progress_of(done: f64) -> f64 {
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if quintic(middle).0 < done { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
 /// Writes the vehicles within `radius_m` of `ego_s_m` into the scene, `tau_s` after the tick.
 pub(crate) fn publish(engine: &Engine, road: &Road, ego_s_m: f64, tau_s: f64, scene: &mut Scene) {
     let (fleet, map) = (&engine.state.fleet, &engine.map);
@@ -85,7 +96,14 @@ pub(crate) fn carry_on(n: &Neighbour, tau_s: f64) -> Neighbour {
 
 #[cfg(test)]
 mod tests {
-    use super::quintic;
+    use super::{progress_of, quintic};
+
+    #[test]
+    fn the_progress_of_a_share_gives_the_share_again() {
+        for done in [0.0, 0.01, 0.3, 0.5, 0.99, 1.0] {
+            assert!((quintic(progress_of(done)).0 - done).abs() < 1e-9, "{done}");
+        }
+    }
 
     #[test]
     fn a_lane_change_starts_and_ends_without_lateral_speed() {

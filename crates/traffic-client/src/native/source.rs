@@ -39,6 +39,10 @@ pub struct NativeCounts {
     pub vehicles: usize,
     /// Vehicles that have entered since the start, the first fill included.
     pub entered: u64,
+    /// Vehicles that came to an entry of the road, those that wait before it included.
+    pub arrived: u64,
+    /// Vehicles that wait before the road for room on it.
+    pub waiting: u64,
     /// Distance driven by all vehicles, km.
     pub driven_km: f64,
     /// Lane changes begun.
@@ -68,21 +72,26 @@ impl NativeTraffic {
         Ok(Self { engine, road, geometry, tick_start: None, scene: Scene::default() })
     }
 
-    /// Traffic that goes on from a scene of another source: its vehicles where they are, with
-    /// drivers of our own, and our traffic beyond the stretch that they lie on. Vehicles within a
-    /// lane change finish it as if it had just begun.
+    /// Traffic that goes on from the last scene of another source, as seen by an ego at `now`: its
+    /// vehicles where they are, with drivers of our own, and our traffic beyond the stretch that a
+    /// scene covers, none of it closer to the ego than both can stop. A lane change goes on from
+    /// where it is.
     ///
     /// # Errors
-    /// As [`NativeTraffic::new`].
+    /// As [`NativeTraffic::new`]; [`TrafficError::Ego`] for an ego that is not finite.
     pub fn take_over(
         road: Arc<Road>,
         geometry: Geometry,
         config: TrafficConfig,
         scene: &Scene,
+        ego: &EgoState,
+        now: Time,
     ) -> Result<Self, TrafficError> {
+        ego.check_finite()?;
         let mut traffic = Self::new(road, geometry, config)?;
-        traffic.engine.adopt(scene);
-        // The vehicles around the ego are those of the scene: nobody is taken away.
+        let first = traffic.engine.adopt(scene, ego.s_m);
+        traffic.see_ego(ego, now, scene.time);
+        traffic.engine.clear_around_ego(first);
         traffic.tick_start = Some(scene.time);
         traffic.engine.decide();
         Ok(traffic)
@@ -117,6 +126,9 @@ impl NativeTraffic {
         NativeCounts {
             vehicles: state.fleet.len(),
             entered: state.next_id,
+            arrived: state.arrived,
+            waiting: state.waiting.iter().map(|&n| u64::from(n)).sum::<u64>()
+                + state.late.len() as u64,
             driven_km: state.driven_m / 1000.0,
             lane_changes: state.lane_changes,
         }
@@ -173,19 +185,6 @@ impl NativeTraffic {
         let map = self.engine.map.clone();
         self.engine.ego.update(ego, &self.geometry, &map, heading, shift_m);
     }
-
-    /// Takes vehicles away that would touch the ego at the start.
-    fn clear_around_ego(&mut self) {
-        let clearance = self.engine.config.ego_clearance_m;
-        let ego = self.engine.ego.clone();
-        self.engine.state.fleet.retain(|f, i| {
-            !ego.spans().iter().any(|span| {
-                f.occupies(i, span.lane)
-                    && f.s_m[i] > span.rear_m - clearance
-                    && f.rear_m(i) < span.front_m + clearance
-            })
-        });
-    }
 }
 
 impl TrafficSource for NativeTraffic {
@@ -197,7 +196,7 @@ impl TrafficSource for NativeTraffic {
             Some(start) => start,
             None => {
                 self.see_ego(ego, now, now);
-                self.clear_around_ego();
+                self.engine.clear_around_ego(0);
                 self.engine.decide();
                 now
             }

@@ -89,7 +89,7 @@ pub fn convert(
         .output()
         .map_err(|e| SumoError::NetConvert {
             exit: "not started".to_owned(),
-            stderr: e.to_string(),
+            stderr: format!("{}: {e}", programs.netconvert.display()),
         })?;
     if !out.status.success() {
         let text = String::from_utf8_lossy(&out.stderr);

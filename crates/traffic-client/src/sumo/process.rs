@@ -16,6 +16,11 @@ use super::error::SumoError;
 
 /// Error output that is kept, bytes.
 const STDERR_BYTES: usize = 64 << 10;
+/// A program is asked for its version this long, s.
+const WORDS_S: u64 = 10;
+/// Of the answer so much is read, bytes, and so much shown, characters.
+const WORDS_BYTES: u64 = 4 << 10;
+const WORDS_SHOWN: usize = 200;
 
 /// Where SUMO's programs are.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,14 +31,18 @@ pub struct Programs {
     pub netconvert: PathBuf,
     /// SUMO_HOME: type maps and schemas.
     pub home: PathBuf,
+    /// What it calls itself and its version: `SUMO 1.28.0`.
+    pub version: String,
 }
 
 impl Programs {
     /// Finds SUMO: the given path or that in `SUMO_BINARY`; if there is neither,
-    /// `SUMO_HOME/bin/sumo`, the Python package `eclipse-sumo`, the PATH.
+    /// `SUMO_HOME/bin/sumo`, the Python package `eclipse-sumo`, the PATH. A program counts if it
+    /// gives SUMO's version and netconvert lies beside it.
     ///
     /// # Errors
-    /// [`SumoError::NotFound`] says where it was looked for and how to get it.
+    /// [`SumoError::NotFound`] says where it was looked for, what other programs printed there, and
+    /// how to get it.
     pub fn find(given: Option<&Path>) -> Result<Self, SumoError> {
         let mut tried = Vec::new();
         let mut candidates: Vec<PathBuf> = Vec::new();
@@ -48,39 +57,37 @@ impl Programs {
             candidates.extend(std::env::split_paths(&path).map(|dir| dir.join("sumo")));
         }
         for candidate in candidates {
-            match native(&candidate) {
-                Some(sumo) => return Ok(Self::beside(sumo)),
-                None => tried.push(candidate.display().to_string()),
+            if !candidate.is_file() {
+                tried.push(candidate.display().to_string());
+                continue;
+            }
+            match native(&candidate).and_then(Self::beside) {
+                Ok(programs) => return Ok(programs),
+                Err(why) => tried.push(format!("{}: {why}", candidate.display())),
             }
         }
         Err(SumoError::NotFound { tried: tried.join(", ") })
     }
 
-    fn beside(sumo: PathBuf) -> Self {
+    fn beside(sumo: PathBuf) -> Result<Self, String> {
         let bin = sumo.parent().unwrap_or(Path::new("")).to_owned();
         let home = bin.parent().unwrap_or(Path::new("")).to_owned();
         let home = if home.join("data").is_dir() { home } else { PathBuf::from("/usr/share/sumo") };
-        Self { netconvert: bin.join("netconvert"), sumo, home }
-    }
-
-    /// What SUMO calls itself and its version: `SUMO 1.28.0`.
-    ///
-    /// # Errors
-    /// [`SumoError::Startup`] if it cannot be asked.
-    pub fn version(&self) -> Result<String, SumoError> {
-        let failed =
-            |stderr: String| SumoError::Startup { exit: "no version given".to_owned(), stderr };
-        let out = self
-            .command(&self.sumo)
-            .arg("--version")
-            .output()
-            .map_err(|e| failed(format!("{}: {e}", self.sumo.display())))?;
-        let text = String::from_utf8_lossy(&out.stdout);
-        let number = text.lines().next().and_then(|line| line.split_whitespace().last());
-        number
-            .filter(|_| out.status.success())
-            .map(|number| format!("SUMO {}", number.trim_start_matches('v')))
-            .ok_or_else(|| failed(String::from_utf8_lossy(&out.stderr).trim().to_owned()))
+        let version = String::new();
+        let mut programs = Self { netconvert: bin.join("netconvert"), sumo, home, version };
+        let mut question = programs.command(&programs.sumo);
+        let said = first_words(question.arg("--version"))?;
+        // `Eclipse SUMO sumo Version 1.28.0`, `Eclipse SUMO sumo v1_28_0`.
+        let line = said.lines().next().unwrap_or_default();
+        let number = line.split_whitespace().last().unwrap_or_default().trim_start_matches('v');
+        if !line.contains("SUMO") || !number.starts_with(|c: char| c.is_ascii_digit()) {
+            return Err(format!("not SUMO, printed {}", quoted(&said)));
+        }
+        if !programs.netconvert.is_file() {
+            return Err(format!("no {} beside it", programs.netconvert.display()));
+        }
+        programs.version = format!("SUMO {number}");
+        Ok(programs)
     }
 
     /// A command with the environment that SUMO's programs need.
@@ -92,24 +99,71 @@ impl Programs {
     }
 }
 
+/// What a program prints first, whether to its output or its error output. Whoever neither ends nor
+/// closes both within [`WORDS_S`] is ended.
+#[expect(clippy::disallowed_methods, reason = "the program is waited for, and read by threads")]
+fn first_words(command: &mut Command) -> Result<String, String> {
+    let mut child = command
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|e| format!("not started: {e}"))?;
+    let (send, words) = std::sync::mpsc::channel();
+    let pipes: [Option<Box<dyn Read + Send>>; 2] = [
+        child.stdout.take().map(|pipe| Box::new(pipe) as _),
+        child.stderr.take().map(|pipe| Box::new(pipe) as _),
+    ];
+    for pipe in pipes.into_iter().flatten() {
+        let send = send.clone();
+        std::thread::spawn(move || {
+            let mut text = Vec::new();
+            let _ = pipe.take(WORDS_BYTES).read_to_end(&mut text);
+            let _ = send.send(String::from_utf8_lossy(&text).trim().to_owned());
+        });
+    }
+    drop(send);
+    let mut said = Vec::new();
+    for _ in 0..2 {
+        match words.recv_timeout(std::time::Duration::from_secs(WORDS_S)) {
+            Ok(text) => said.push(text),
+            Err(_) => break,
+        }
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+    Ok(said.into_iter().find(|text| !text.is_empty()).unwrap_or_default())
+}
+
+/// The beginning of what a program printed, on one line.
+fn quoted(said: &str) -> String {
+    let line = said.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>();
+    let shown: String = line.join(" | ").chars().take(WORDS_SHOWN).collect();
+    if shown.is_empty() { "nothing".to_owned() } else { format!("`{shown}`") }
+}
+
 #[expect(clippy::disallowed_methods, reason = "the process shell looks up where SUMO is installed")]
 fn environment(name: &str) -> Option<String> {
     std::env::var(name).ok().filter(|value| !value.is_empty())
 }
 
 /// The native program behind a path: itself, or what a Python wrapper stands for.
-fn native(path: &Path) -> Option<PathBuf> {
-    let mut file = std::fs::File::open(path).ok()?;
+fn native(path: &Path) -> Result<PathBuf, String> {
+    let mut file = std::fs::File::open(path).map_err(|e| e.to_string())?;
     let mut head = [0u8; 256];
-    let n = file.read(&mut head).ok()?;
-    let head = head.get(..n)?;
+    let n = file.read(&mut head).map_err(|e| e.to_string())?;
+    let head = head.get(..n).unwrap_or_default();
     if !head.starts_with(b"#!") {
-        return path.is_file().then(|| path.to_owned());
+        return Ok(path.to_owned());
     }
-    let line = std::str::from_utf8(head.split(|&b| b == b'\n').next()?).ok()?;
-    let interpreter = line.trim_start_matches("#!").trim();
-    let sumo = python_home(Path::new(interpreter))?.join("bin/sumo");
-    sumo.is_file().then_some(sumo)
+    let line = head.split(|&b| b == b'\n').next().unwrap_or_default();
+    let interpreter = String::from_utf8_lossy(line).trim_start_matches("#!").trim().to_owned();
+    match python_home(Path::new(&interpreter)).map(|home| home.join("bin/sumo")) {
+        Some(sumo) if sumo.is_file() => Ok(sumo),
+        _ => {
+            let said = first_words(Command::new(path).arg("--version").stdin(Stdio::null()))?;
+            Err(format!("not the native program but a script, printed {}", quoted(&said)))
+        }
+    }
 }
 
 /// SUMO_HOME of the package `eclipse-sumo` of a Python interpreter.
@@ -146,7 +200,7 @@ impl Process {
             .spawn()
             .map_err(|e| SumoError::Startup {
                 exit: "not started".to_owned(),
-                stderr: e.to_string(),
+                stderr: format!("{}: {e}", programs.sumo.display()),
             })?;
         let stderr = Arc::new(Mutex::new(VecDeque::new()));
         if let Some(mut pipe) = child.stderr.take() {

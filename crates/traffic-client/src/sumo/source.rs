@@ -114,6 +114,12 @@ impl SumoTraffic {
         &self.scene
     }
 
+    /// Whether a scene was shown since the start or the last reset.
+    #[must_use]
+    pub fn has_shown(&self) -> bool {
+        self.step_time.is_some()
+    }
+
     /// The programs that are used.
     #[must_use]
     pub fn programs(&self) -> &Programs {

@@ -68,7 +68,7 @@ impl SumoTraffic {
         let request = link.session.request();
         if sees_ego {
             if !self.ego_inside {
-                request.set(id::VEHICLE, var::ADD, EGO, &add_ego());
+                request.set(id::VEHICLE, var::ADD, EGO, &add_ego(ego.speed_m_s));
             }
             request.move_to_xy(EGO, front.0, front.1, sumo_angle_deg(yaw));
             if !self.ego_inside {
@@ -79,7 +79,7 @@ impl SumoTraffic {
             match (ghost, self.ghost) {
                 (Some((x, y, heading)), was) => {
                     if !was {
-                        request.set(id::VEHICLE, var::ADD, GHOST, &add_ego());
+                        request.set(id::VEHICLE, var::ADD, GHOST, &add_ego(ego.speed_m_s));
                     }
                     request.move_to_xy(GHOST, x, y, sumo_angle_deg(heading));
                 }
@@ -121,10 +121,13 @@ fn sumo_angle_deg(yaw_rad: f64) -> f64 {
     turn - 360.0 * libm::floor(turn / 360.0)
 }
 
-/// The value of an `add` for the ego and its ghost: they are moved in the same message.
-fn add_ego() -> Value {
+/// The value of an `add` for the ego and its ghost: they are moved in the same message. With
+/// another speed they would have that one for their first step, and who is behind them would brake
+/// for it.
+fn add_ego(speed_m_s: f64) -> Value {
+    let speed = format!("{:.3}", speed_m_s.max(0.0));
     let texts =
-        [EGO_ROUTE, EGO, "now", "first", "base", "0", "current", "max", "current", "", "", ""];
+        [EGO_ROUTE, EGO, "now", "first", "base", &speed, "current", "max", "current", "", "", ""];
     let mut list: Vec<Value> = texts.iter().map(|t| Value::Text((*t).to_owned())).collect();
     list.extend([Value::Int(0), Value::Int(0)]);
     Value::Compound(list)
