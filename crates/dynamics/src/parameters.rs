@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::DynamicsError;
 use crate::bounds::Bounds;
 use crate::effects::brake::BrakeParameters;
+use crate::effects::cooling::CoolingParameters;
 use crate::effects::driveline::DrivelineParameters;
 use crate::effects::engine::EngineParameters;
 use crate::effects::instruments::InstrumentParameters;
@@ -20,10 +21,11 @@ use crate::effects::shift::ShiftParameters;
 use crate::effects::table::TableEffect;
 use crate::lateral::LateralParameters;
 
-const BUILTIN: [(&str, &str); 4] = [
+const BUILTIN: [(&str, &str); 5] = [
     ("longhaul", include_str!("../trucks/longhaul.toml")),
     ("sinotruk", include_str!("../trucks/sinotruk.toml")),
     ("reference", include_str!("../trucks/reference.toml")),
+    ("vecto-40t", include_str!("../trucks/vecto-40t.toml")),
     ("iits", include_str!("../trucks/iits.toml")),
 ];
 
@@ -47,6 +49,9 @@ pub struct TruckParameters {
     pub shift: ShiftParameters,
     /// Service brakes.
     pub brake: BrakeParameters,
+    /// Coolant; without it the retarder never tires.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cooling: Option<CoolingParameters>,
     /// Rolling and air resistance.
     pub resistance: ResistanceParameters,
     /// Masses, lengths, tyres, steering.
@@ -224,6 +229,7 @@ impl TruckParameters {
         violations.extend(self.driveline.violations());
         violations.extend(self.shift.violations(self.driveline.gear_ratios.len()));
         violations.extend(self.brake.violations());
+        violations.extend(self.cooling.iter().flat_map(CoolingParameters::violations));
         violations.extend(self.resistance.violations());
         violations.extend(self.table_effects.iter().flat_map(TableEffect::violations));
         violations.extend(self.lateral.violations().into_iter().map(|v| format!("lateral.{v}")));

@@ -123,8 +123,10 @@ pub struct TruckState {
 pub struct Forces {
     /// Driveline at the wheels, retarder excluded; negative under engine braking.
     pub drive_n: f64,
-    /// Retarder and hidden retarder at the wheels.
+    /// Retarder and hidden retarder at the wheels, within the grip of the drive axles.
     pub retarder_n: f64,
+    /// The retarder's own part of it, whose power heats the coolant.
+    pub retarder_heat_n: f64,
     /// Service brakes.
     pub brake_n: f64,
     /// Rolling resistance and parasitic force.

@@ -61,24 +61,31 @@ impl TruckModel {
             air_density_kg_m3(patch.air_pressure_pa, patch.air_temperature_k),
             (r.headwind_m_s, r.crosswind_to_left_m_s),
         );
-        let grip = patch.adhesion_coeff;
+        let grip = self.grip_left_coeff(s, patch);
+        let drive_limit = grip * self.brake_share[1] * self.mass_kg * GRAVITY_M_S2;
+        let drive_n = wheel.drive_n.clamp(-drive_limit, drive_limit);
+        // What engine and engine brake leave of the drive axles' grip is the retarder's, then the
+        // service brakes': the anti-lock system takes the retarder away before wheels slip.
+        let own_n = d.shaft_force_n(s.retarder_nm);
+        let hidden_nm = d.hidden_retarder_nm(v, command.accelerator_pedal_frac);
+        let wanted_n = own_n + d.shaft_force_n(hidden_nm);
+        let retarder_n = wanted_n.min(drive_limit + drive_n.min(0.0));
+        let retarder_heat_n = own_n * if wanted_n > 0.0 { retarder_n / wanted_n } else { 0.0 };
+        let driveline_n = retarder_n - drive_n.min(0.0);
         let mut axle_n = [0.0; AXLES];
         let mut brake_n = 0.0;
         for (g, axles) in GROUP_AXLES.into_iter().enumerate() {
             let share = self.brake_share[g];
             let pressure = b.acting_pressure_pa(&s.brake, g);
             let wanted = b.force_n(share, pressure, s.brake.temperature_k[g]);
-            let held = wanted.min(grip * share * self.mass_kg * GRAVITY_M_S2);
+            let used_n = if g == 1 { driveline_n } else { 0.0 };
+            let held = wanted.min(grip * share * self.mass_kg * GRAVITY_M_S2 - used_n);
             brake_n += held;
             let count = axles.len() as f64;
             for a in axles {
                 axle_n[a] -= held / count;
             }
         }
-        let drive_limit = grip * self.brake_share[1] * self.mass_kg * GRAVITY_M_S2;
-        let hidden_nm = d.hidden_retarder_nm(v, command.accelerator_pedal_frac);
-        let retarder_n = d.shaft_force_n(s.retarder_nm + hidden_nm).min(drive_limit);
-        let drive_n = wheel.drive_n.clamp(-drive_limit, drive_limit);
         axle_n[1] += 0.5 * (drive_n - retarder_n);
         axle_n[2] += 0.5 * (drive_n - retarder_n);
         let effective_mass_kg =
@@ -87,6 +94,7 @@ impl TruckModel {
             table_n: effective_mass_kg * self.table_accel_m_s2(s, command, patch),
             drive_n,
             retarder_n,
+            retarder_heat_n,
             brake_n,
             rolling_n: r.rolling_n(self.mass_kg, v, cos, s.tyre_warmth),
             drag_n: r.drag_n(&air),
@@ -123,6 +131,16 @@ impl TruckModel {
             trailer: BodyForce { side_n: trailer_n, yaw_moment_nm: 0.0 },
             axle_longitudinal_force_n: axle_n,
         }
+    }
+
+    /// Adhesion that the side forces leave to the longitudinal ones (friction circle), all axles
+    /// taken alike.
+    fn grip_left_coeff(&self, s: &TruckState, patch: &RoadPatch) -> f64 {
+        let side = s.speed_m_s * s.lateral.yaw_rate_rad_s / GRAVITY_M_S2;
+        if side == 0.0 {
+            return patch.adhesion_coeff;
+        }
+        libm::sqrt((patch.adhesion_coeff * patch.adhesion_coeff - side * side).max(0.0))
     }
 
     /// Induced drag of the quasi-static side forces.

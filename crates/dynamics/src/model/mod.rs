@@ -15,6 +15,7 @@ mod powertrain;
 use tractrix_core::{BrakeMode, Command, Curve, RPM_PER_RAD_S};
 
 use crate::effects::brake::GROUPS;
+use crate::effects::cooling::HeatSources;
 use crate::effects::engine::Engine;
 use crate::effects::shift::ShiftState;
 use crate::effects::table::{self, TableSignal};
@@ -26,7 +27,8 @@ use crate::{DynamicsError, TruckParameters};
 const GROUP_AXLES: [core::ops::Range<usize>; GROUPS] = [0..1, 1..3, 3..6];
 /// Speed below which static friction decides, m/s.
 const STANDSTILL_M_S: f64 = 1e-3;
-/// Coolant: time constant, s, rise per indicated power, K/W, level at no load above air, K.
+/// Coolant of a truck file without a cooling block: time constant, s, rise per indicated power, K/W,
+/// level at no load above air, K.
 const COOLANT: (f64, f64, f64) = (240.0, 9.0e-5, 60.0);
 
 /// A truck in one loading state.
@@ -220,11 +222,21 @@ impl TruckModel {
         let r = &self.parameters.resistance;
         let rolling = if s.speed_m_s.abs() > 1.0 { 1.0 } else { 0.0 };
         s.tyre_warmth += (rolling - s.tyre_warmth) * SUBSTEP_S / r.tyre_warmup_s;
-        let power = s.engine_torque_nm * s.engine_speed_rad_s;
+        let indicated_w = s.engine_torque_nm * s.engine_speed_rad_s;
         s.fan_runs = self.engine.fan_runs(s.fan_runs, s.coolant_k);
-        let fan = if s.fan_runs { 12.0 } else { 0.0 };
-        let level = patch.air_temperature_k + COOLANT.2 + COOLANT.1 * power - fan;
-        s.coolant_k += (level.max(350.0) - s.coolant_k) * SUBSTEP_S / COOLANT.0;
+        let Some(cooling) = &self.parameters.cooling else {
+            let fan = if s.fan_runs { 12.0 } else { 0.0 };
+            let level = patch.air_temperature_k + COOLANT.2 + COOLANT.1 * indicated_w - fan;
+            s.coolant_k += (level.max(350.0) - s.coolant_k) * SUBSTEP_S / COOLANT.0;
+            return;
+        };
+        let from = HeatSources {
+            indicated_w,
+            engine_brake_w: s.engine_brake_nm * s.engine_speed_rad_s,
+            retarder_w: s.forces.retarder_heat_n * s.speed_m_s.abs(),
+        };
+        let air_k = patch.air_temperature_k;
+        s.coolant_k = cooling.step_k(s.coolant_k, s.fan_runs, &from, air_k, SUBSTEP_S);
     }
 
     /// The road under the truck where the map says `patch`.

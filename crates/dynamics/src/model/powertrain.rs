@@ -3,6 +3,7 @@
 use tractrix_core::{Command, GearRequest};
 
 use super::{STANDSTILL_M_S, TruckModel};
+use crate::effects::cooling::CoolingParameters;
 use crate::effects::shift::{ShiftPhase, ShiftState, TcuView};
 use crate::state::{SUBSTEP_S, TruckState};
 
@@ -138,7 +139,9 @@ impl TruckModel {
         s.engine_brake_nm +=
             (brake_target - s.engine_brake_nm) * (SUBSTEP_S / p.engine_brake_lag_s).min(1.0);
         let d = &self.parameters.driveline;
-        let retarder_target = retarder * d.retarder_limit_nm(s.speed_m_s);
+        let left = |c: &CoolingParameters| c.retarder_left_frac(s.coolant_k);
+        let left_frac = self.parameters.cooling.as_ref().map_or(1.0, left);
+        let retarder_target = retarder * left_frac * d.retarder_limit_nm(s.speed_m_s);
         s.retarder_nm = d.retarder_step_nm(s.retarder_nm, retarder_target, SUBSTEP_S);
         let burning = if s.shift.phase == ShiftPhase::Open { holding } else { s.engine_torque_nm };
         s.fuel_rate_g_s = e.fuel_rate_g_s(n, burning);
