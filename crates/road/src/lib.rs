@@ -12,6 +12,7 @@ pub mod builtin;
 mod csv_profile;
 mod cubics;
 mod error;
+mod geo;
 mod lane;
 mod line;
 #[cfg(feature = "std")]
@@ -25,6 +26,7 @@ mod smooth;
 pub use bake::BAKE_TOLERANCE_M;
 pub use cubics::Cubics;
 pub use error::RoadError;
+pub use geo::GeoReference;
 pub use lane::{LaneEnd, LaneKind, LaneSource, LaneTrack};
 pub use line::{Knot, Line};
 pub use road::{ProfilePoint, Road, RoadObject, RoadPoint, RoadPosition};

@@ -3,7 +3,7 @@
 use alloc::{string::String, vec::Vec};
 
 use crate::small;
-use crate::{Cubics, LaneKind, LaneTrack, Line, RoadError};
+use crate::{Cubics, GeoReference, LaneKind, LaneTrack, Line, RoadError};
 
 /// A point on the road surface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -80,6 +80,7 @@ pub struct Road {
     sections: Vec<Section>,
     limits: Vec<(f64, f64)>,
     objects: Vec<RoadObject>,
+    geo_reference: Option<GeoReference>,
 }
 
 impl Road {
@@ -110,7 +111,15 @@ impl Road {
             return Err(bad("a lane must end after its start"));
         }
         let sections = sections(&lanes, line.length_m());
-        Ok(Self { name: name.into(), line, lanes, sections, limits, objects: Vec::new() })
+        Ok(Self {
+            name: name.into(),
+            line,
+            lanes,
+            sections,
+            limits,
+            objects: Vec::new(),
+            geo_reference: None,
+        })
     }
 
     /// The same road with objects recorded along it.
@@ -118,6 +127,19 @@ impl Road {
     pub fn with_objects(mut self, objects: Vec<RoadObject>) -> Self {
         self.objects = objects;
         self
+    }
+
+    /// The same road with its place on the earth; a reference without a projection is none.
+    #[must_use]
+    pub fn with_geo_reference(mut self, geo: &GeoReference) -> Self {
+        self.geo_reference = (!geo.projection.is_empty()).then(|| geo.clone());
+        self
+    }
+
+    /// Where the map lies on the earth, if its file says so.
+    #[must_use]
+    pub const fn geo_reference(&self) -> Option<&GeoReference> {
+        self.geo_reference.as_ref()
     }
 
     /// Tunnels and bridges along the road.

@@ -21,7 +21,7 @@ fn heights_bank_offsets_and_widths_are_those_of_the_records() {
     let network = read(ALL);
     let road = &network.roads[0];
     assert_eq!((road.name.as_str(), road.id.as_str()), ("everything & more", "7"));
-    assert!(network.header.geo_reference.starts_with("+proj=tmerc"));
+    assert!(network.header.geo_reference.projection.starts_with("+proj=tmerc"));
     let k = road.line.at(300.0);
     near(k.z_m, 104.0 + 2.0 - 1.0, 1e-12);
     near(k.slope, 0.0, 1e-12);
@@ -35,6 +35,30 @@ fn heights_bank_offsets_and_widths_are_those_of_the_records() {
     let offset = 0.0003 * 2_500.0 - 0.000_002 * 125_000.0;
     assert_eq!(road.lane_edges_m(1, -2, 350.0).unwrap(), (offset - 3.75, offset - 7.5));
     assert_eq!(road.lane_edges_m(1, 1, 450.0).unwrap(), (1.0, 4.5));
+}
+
+#[test]
+fn the_place_on_the_earth_goes_with_the_route_and_through_writing() {
+    let text = ALL.replace(
+        "</geoReference>",
+        "</geoReference><offset x=\"4e5\" y=\"-2\" z=\"7\" hdg=\"0.5\"/>",
+    );
+    let network = read(&text);
+    assert!(!network.ignored.contains_key("offset"));
+    let route = network.longest_route().unwrap();
+    let geo = route.geo_reference().unwrap();
+    assert_eq!(geo, &network.header.geo_reference);
+    let [x, y, z] = geo.projected_m(10.0, 20.0, 1.0);
+    let (sin, cos) = 0.5_f64.sin_cos();
+    near(x, 4e5 + 10.0 * cos - 20.0 * sin, 1e-9);
+    near(y, -2.0 + 10.0 * sin + 20.0 * cos, 1e-12);
+    near(z, 8.0, 1e-12);
+    assert_eq!(&read(&network.write_opendrive()).header.geo_reference, geo);
+    assert_eq!(read(COMMON).longest_route().unwrap().geo_reference(), None);
+    let bad = ALL
+        .replace("</geoReference>", "</geoReference><offset x=\"a\" y=\"0\" z=\"0\" hdg=\"0\"/>");
+    let error = Network::parse("map.xodr", &bad).unwrap_err().to_string();
+    assert!(error.contains("<offset>") && error.contains("x = \"a\""), "{error}");
 }
 
 #[test]

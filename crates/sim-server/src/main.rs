@@ -9,6 +9,7 @@ mod cmd;
 mod dashboard;
 mod driver;
 mod failure;
+mod lane_lines;
 mod output;
 mod picture;
 mod progress;

@@ -18,10 +18,11 @@ const UNSUPPORTED: [&str; 8] = [
     "virtualConnection",
 ];
 /// Elements that are read.
-const READ: [&str; 36] = [
+const READ: [&str; 37] = [
     "OpenDRIVE",
     "header",
     "geoReference",
+    "offset",
     "road",
     "link",
     "predecessor",

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::{Cubics, Line, Placed, RoadObject};
+use crate::{Cubics, GeoReference, Line, Placed, RoadObject};
 
 /// A whole map.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,8 +32,8 @@ pub struct Header {
     pub rev_minor: u32,
     /// Name of the map.
     pub name: String,
-    /// Projection, as written (PROJ string), empty if none.
-    pub geo_reference: String,
+    /// Where the map lies on the earth.
+    pub geo_reference: GeoReference,
 }
 
 /// Which end of a road is touched.

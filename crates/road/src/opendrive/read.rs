@@ -10,7 +10,7 @@ use super::model::{Connection, Contact, Header, Junction, Link, Network, RoadRec
 use super::read_lanes;
 use super::xml::{Source, child, children};
 use crate::bake::Baker;
-use crate::{Cubics, Line, Placed, RoadError, RoadObject, Shape};
+use crate::{Cubics, GeoReference, Line, Placed, RoadError, RoadObject, Shape};
 
 /// Larger files are refused, bytes.
 const MAX_BYTES: u64 = 128 << 20;
@@ -111,12 +111,20 @@ fn header(source: &Source<'_>, root: Node<'_, '_>) -> Result<Header, RoadError> 
         rev_major: major as u32,
         rev_minor: minor as u32,
         name: node.attribute("name").unwrap_or("").into(),
-        geo_reference: child(node, "geoReference")
-            .and_then(|g| g.text())
-            .unwrap_or("")
-            .trim()
-            .into(),
+        geo_reference: geo_reference(source, node)?,
     })
+}
+
+/// The header's projection and the offset of the map in it.
+fn geo_reference(source: &Source<'_>, header: Node<'_, '_>) -> Result<GeoReference, RoadError> {
+    let text = child(header, "geoReference").and_then(|g| g.text()).unwrap_or("");
+    let mut geo = GeoReference { projection: text.trim().into(), ..GeoReference::default() };
+    if let Some(node) = child(header, "offset") {
+        geo.offset_m =
+            [source.number(node, "x")?, source.number(node, "y")?, source.number(node, "z")?];
+        geo.offset_heading_rad = source.number(node, "hdg")?;
+    }
+    Ok(geo)
 }
 
 fn road(source: &Source<'_>, node: Node<'_, '_>) -> Result<RoadRecord, RoadError> {

@@ -115,7 +115,8 @@ impl Network {
         }
         let limits = limits(&tracks, line.length_m());
         let objects = legs.iter().flat_map(objects).collect();
-        Ok(Road::new(&self.name, line, tracks, limits)?.with_objects(objects))
+        let road = Road::new(&self.name, line, tracks, limits)?.with_objects(objects);
+        Ok(road.with_geo_reference(&self.header.geo_reference))
     }
 }
 

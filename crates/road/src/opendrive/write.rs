@@ -7,7 +7,7 @@ use super::elements::elements;
 use super::model::{Header, Lane, LaneOutline, LaneSection, Network, RoadRecord};
 use super::xml_out::Xml;
 use crate::cubics::Span;
-use crate::{Cubics, LaneKind, Road};
+use crate::{Cubics, GeoReference, LaneKind, Road};
 
 impl Network {
     /// The network as OpenDRIVE. Records that are not read are not written.
@@ -29,7 +29,7 @@ impl Road {
             rev_major: 1,
             rev_minor: 6,
             name: self.name().into(),
-            geo_reference: String::new(),
+            geo_reference: GeoReference::default(),
         };
         let mut out = Xml::new(&header);
         out.road(&record_of(self));

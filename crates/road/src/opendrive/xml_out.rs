@@ -15,9 +15,12 @@ impl Xml {
         let (major, minor) = (header.rev_major, header.rev_minor);
         let name = escape(&header.name);
         out.line(&format!("<header revMajor=\"{major}\" revMinor=\"{minor}\" name=\"{name}\">"));
-        if !header.geo_reference.is_empty() {
-            let text = escape(&header.geo_reference);
+        let geo = &header.geo_reference;
+        if !geo.projection.is_empty() {
+            let text = escape(&geo.projection);
             out.line(&format!("<geoReference>{text}</geoReference>"));
+            let ([x, y, z], heading) = (geo.offset_m, geo.offset_heading_rad);
+            out.line(&format!("<offset x=\"{x}\" y=\"{y}\" z=\"{z}\" hdg=\"{heading}\"/>"));
         }
         out.line("</header>");
         out

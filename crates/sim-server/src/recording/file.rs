@@ -29,6 +29,20 @@ const CHUNK_BYTES: u64 = 1024 * 1024;
 /// CDR, little endian, plain (OMG DDSI-RTPS 2.3, 10.5).
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
+/// Quality of service of a latched topic in rosbag2's words (`rmw_qos_profile_t`): keep the last,
+/// reliable, transient local, no deadlines.
+const LATCHED: &str = "\
+- history: 1
+  depth: 1
+  reliability: 1
+  durability: 1
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: 1
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+";
+
 /// A topic with its message type, open for writing.
 #[derive(Debug)]
 pub(super) struct Channel<M> {
@@ -55,12 +69,26 @@ impl McapFile {
 
     /// Opens a topic.
     pub(super) fn channel<M: Message>(&mut self, topic: &str) -> Result<Channel<M>, Failure> {
+        self.channel_with(topic, &BTreeMap::new())
+    }
+
+    /// Opens a topic whose last message a late subscriber gets.
+    pub(super) fn latched<M: Message>(&mut self, topic: &str) -> Result<Channel<M>, Failure> {
+        let profiles = ("offered_qos_profiles".to_owned(), LATCHED.to_owned());
+        self.channel_with(topic, &BTreeMap::from([profiles]))
+    }
+
+    fn channel_with<M: Message>(
+        &mut self,
+        topic: &str,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<Channel<M>, Failure> {
         let text = schema_text(M::DEFINITION)
             .ok_or_else(|| Failure::Work(format!("no definition of {}", M::DEFINITION)))?;
         let id = self
             .writer
             .add_schema(M::NAME, "ros2msg", text.as_bytes())
-            .and_then(|schema| self.writer.add_channel(schema, topic, "cdr", &BTreeMap::new()))
+            .and_then(|schema| self.writer.add_channel(schema, topic, "cdr", metadata))
             .map_err(|e| self.failed(e))?;
         Ok(Channel { id, message: std::marker::PhantomData })
     }

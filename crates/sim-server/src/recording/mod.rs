@@ -8,13 +8,13 @@
 //! Message times are simulation time (nanoseconds since the start of the run), so that a recording
 //! of the same seed holds the same messages; the wall time of the start is in the metadata.
 
-mod bodies;
 mod file;
 mod layout;
 mod recorder;
 pub(crate) mod recover;
 pub(crate) mod ros;
+mod telemetry;
 
-pub(crate) use bodies::Combination;
 pub(crate) use layout::Layout;
 pub(crate) use recorder::{Recording, RunHeader};
+pub(crate) use telemetry::Combination;

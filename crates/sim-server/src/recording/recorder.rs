@@ -1,6 +1,7 @@
 //! The recorder of the main job: owned ticks over a bounded channel to the writer's thread.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -9,14 +10,13 @@ use std::thread::JoinHandle;
 use road::Road;
 use tractrix_core::{EgoState, Plan, Recorder, Scene, Tick, Time};
 
-use super::bodies::{Combination, ego_markers, neighbour_marker, tractor_pose};
 use super::file::{Channel, McapFile};
-use super::ros::standard::{
-    Clock, Header, MarkerArray, Odometry, Path as RosPath, Pose, PoseStamped, PoseWithCovariance,
-    Quaternion, Stamp, TfMessage, Transform, TransformStamped, Twist, TwistWithCovariance, Vector3,
-};
-use super::ros::truck::{PlanState, Scene as RosScene, SceneVehicle, TruckState};
+use super::ros::marker::MarkerArray;
+use super::ros::standard::{Clock, NavSatFix, Odometry, Path as RosPath, TfMessage};
+use super::ros::truck::{PlanState, Scene as RosScene, TruckState};
+use super::telemetry::{self, Combination, Geodesy, Scenery};
 use crate::failure::Failure;
+use crate::output::note;
 
 /// What a recording says about its run.
 pub(crate) struct RunHeader {
@@ -37,13 +37,29 @@ const SCENE_PERIOD: Time = Time(100_000_000);
 /// Chunks are closed this often (simulated).
 const FLUSH_PERIOD: Time = Time(1_000_000_000);
 
+/// The lane lines around the truck are repeated this often, for viewers that join or jump.
+const LANES_PERIOD: Time = Time(10_000_000_000);
+/// How far around the truck they are repeated, m.
+const LANES_BEHIND_M: f64 = 500.0;
+const LANES_AHEAD_M: f64 = 1500.0;
+
 /// One tick on its way to the writer.
 struct Record {
     now: Time,
     ego: EgoState,
     /// Without its speed profile, and without its path except at the scene's rate.
     plan: Plan,
+    /// At the scene's rate.
     scene: Option<Scene>,
+}
+
+impl Record {
+    /// The tick; its scene is empty between those that are recorded.
+    fn tick(&self) -> Tick<'_> {
+        static NONE: Scene = Scene { time: Time::ZERO, neighbours: Vec::new() };
+        let scene = self.scene.as_ref().unwrap_or(&NONE);
+        Tick { now: self.now, ego: &self.ego, scene, plan: &self.plan }
+    }
 }
 
 /// A recording under way.
@@ -63,8 +79,12 @@ impl Recording {
         let mut file = McapFile::create(path)?;
         file.metadata("run", header.metadata)?;
         file.attach("scenario.toml", "application/toml", header.scenario_toml.as_bytes())?;
-        let mut tracks = Tracks::open(file, header.road, header.combination)?;
-        tracks.file.flush()?;
+        let geodesy = Geodesy::of(&header.road).unwrap_or_else(|why| {
+            note(&format!("{}: {why}: no /fix in the recording", header.road.name()));
+            None
+        });
+        let scenery = Scenery { road: header.road, combination: header.combination, geodesy };
+        let tracks = Tracks::open(file, scenery)?;
         let (sender, receiver) = sync_channel(QUEUE_TICKS);
         let thread = spawn(move || tracks.run(&receiver))?;
         Ok(Self { sender, thread, broken: false, scene_due: Time::ZERO })
@@ -134,9 +154,9 @@ fn spawn<T: Send + 'static>(
 /// The open topics.
 struct Tracks {
     file: McapFile,
-    road: Arc<Road>,
-    combination: Combination,
+    scenery: Scenery,
     flush_due: Time,
+    lanes_due: Time,
     clock: Channel<Clock>,
     tf: Channel<TfMessage>,
     odometry: Channel<Odometry>,
@@ -145,15 +165,18 @@ struct Tracks {
     path: Channel<RosPath>,
     scene: Channel<RosScene>,
     markers: Channel<MarkerArray>,
+    lanes: Channel<MarkerArray>,
+    /// Where the road has a geo reference.
+    fix: Option<Channel<NavSatFix>>,
 }
 
 impl Tracks {
-    fn open(
-        mut file: McapFile,
-        road: Arc<Road>,
-        combination: Combination,
-    ) -> Result<Self, Failure> {
-        Ok(Self {
+    /// Opens the topics and writes what does not change: frames and the lines of the whole road.
+    fn open(mut file: McapFile, scenery: Scenery) -> Result<Self, Failure> {
+        let frames = file.latched("/tf_static")?;
+        file.write(&frames, Time::ZERO, &telemetry::static_transforms(&scenery))?;
+        let fix = scenery.geodesy.is_some().then(|| file.channel("/fix")).transpose()?;
+        let mut tracks = Self {
             clock: file.channel("/clock")?,
             tf: file.channel("/tf")?,
             odometry: file.channel("/odom")?,
@@ -162,11 +185,17 @@ impl Tracks {
             path: file.channel("/plan/path")?,
             scene: file.channel("/scene")?,
             markers: file.channel("/markers")?,
+            lanes: file.latched("/road/lanes")?,
+            fix,
             file,
-            road,
-            combination,
+            scenery,
             flush_due: FLUSH_PERIOD,
-        })
+            lanes_due: LANES_PERIOD,
+        };
+        let length_m = tracks.scenery.road.length_m();
+        tracks.write_lanes(Time::ZERO, &(0.0..length_m))?;
+        tracks.file.flush()?;
+        Ok(tracks)
     }
 
     fn run(mut self, records: &Receiver<Record>) -> Result<McapFile, Failure> {
@@ -181,68 +210,35 @@ impl Tracks {
     }
 
     fn write(&mut self, record: &Record) -> Result<(), Failure> {
-        let Record { now, ego, plan, scene } = record;
-        let stamp = Stamp::of(*now);
-        let header = Header { stamp, frame_id: "map" };
-        let pose = tractor_pose(ego, &self.road);
-        let grade_rad = self.road.at(ego.s_m, ego.d_m).grade_rad;
+        let (now, tick, world) = (record.now, record.tick(), &self.scenery);
         let file = &mut self.file;
-        file.write(&self.clock, *now, &Clock { clock: stamp })?;
-        file.write(&self.tf, *now, &transforms(stamp, &pose, ego, &self.combination))?;
-        file.write(&self.odometry, *now, &odometry(header.clone(), pose, ego))?;
-        let truck = TruckState::new(header.clone(), ego, grade_rad, &plan.command);
-        file.write(&self.truck, *now, &truck)?;
-        file.write(&self.plan, *now, &PlanState::new(header.clone(), plan))?;
-        let Some(scene) = scene else { return Ok(()) };
-        let poses = plan.path.iter().map(|p| {
-            let at = self.road.at(p.s_m, p.d_m);
-            let orientation =
-                Quaternion::from_yaw_pitch_roll(p.yaw_rad, -at.grade_rad, at.bank_rad);
-            let pose = Pose { position: Vector3 { x: p.x_m, y: p.y_m, z: at.z_m }, orientation };
-            PoseStamped { header: header.clone(), pose }
-        });
-        let path = RosPath { header: header.clone(), poses: poses.collect() };
-        file.write(&self.path, *now, &path)?;
-        let vehicles = scene.neighbours.iter().map(SceneVehicle::from).collect();
-        file.write(&self.scene, *now, &RosScene { header: header.clone(), vehicles })?;
-        let markers = ego_markers(&header, ego, &self.combination)
-            .into_iter()
-            .chain(scene.neighbours.iter().map(|n| neighbour_marker(&header, n, &self.road)))
-            .collect();
-        file.write(&self.markers, *now, &MarkerArray { markers })
+        file.write(&self.clock, now, &telemetry::clock(now))?;
+        file.write(&self.tf, now, &telemetry::transforms(&tick, world))?;
+        file.write(&self.odometry, now, &telemetry::odometry(&tick, world))?;
+        file.write(&self.truck, now, &telemetry::truck_state(&tick, world))?;
+        file.write(&self.plan, now, &telemetry::plan_state(&tick))?;
+        if record.scene.is_none() {
+            return Ok(());
+        }
+        file.write(&self.path, now, &telemetry::path(&tick, world))?;
+        file.write(&self.scene, now, &telemetry::scene(&tick))?;
+        file.write(&self.markers, now, &telemetry::markers(&tick, world))?;
+        if let (Some(channel), Some(fix)) = (&self.fix, telemetry::fix(&tick, world)) {
+            file.write(channel, now, &fix)?;
+        }
+        if now >= self.lanes_due {
+            self.lanes_due = now.plus_nanos(LANES_PERIOD.0);
+            let s_m = tick.ego.s_m;
+            self.write_lanes(now, &(s_m - LANES_BEHIND_M..s_m + LANES_AHEAD_M))?;
+        }
+        Ok(())
     }
-}
 
-/// `map` to `base_link` (the reference point) and `base_link` to `trailer` (the hitch, turned by
-/// the articulation).
-fn transforms(stamp: Stamp, pose: &Pose, ego: &EgoState, c: &Combination) -> TfMessage {
-    let hitch = Vector3 { x: c.hitch_m, y: 0.0, z: 0.0 };
-    let turned = Quaternion::from_yaw_pitch_roll(ego.trailer.articulation_rad, 0.0, 0.0);
-    TfMessage {
-        transforms: vec![
-            TransformStamped {
-                header: Header { stamp, frame_id: "map" },
-                child_frame_id: "base_link",
-                transform: Transform { translation: pose.position, rotation: pose.orientation },
-            },
-            TransformStamped {
-                header: Header { stamp, frame_id: "base_link" },
-                child_frame_id: "trailer",
-                transform: Transform { translation: hitch, rotation: turned },
-            },
-        ],
-    }
-}
-
-fn odometry(header: Header, pose: Pose, ego: &EgoState) -> Odometry {
-    let twist = Twist {
-        linear: Vector3 { x: ego.speed_m_s, y: ego.lateral_speed_m_s, z: 0.0 },
-        angular: Vector3 { x: 0.0, y: 0.0, z: ego.yaw_rate_rad_s },
-    };
-    Odometry {
-        header,
-        child_frame_id: "base_link",
-        pose: PoseWithCovariance { pose, covariance: [0.0; 36] },
-        twist: TwistWithCovariance { twist, covariance: [0.0; 36] },
+    /// The lane lines of a part of the road.
+    fn write_lanes(&mut self, now: Time, stations_m: &Range<f64>) -> Result<(), Failure> {
+        for message in telemetry::lane_markers(now, stations_m, &self.scenery) {
+            self.file.write(&self.lanes, now, &message)?;
+        }
+        Ok(())
     }
 }

@@ -35,6 +35,21 @@ const DEFINITIONS: &[(&str, &str)] = &[
     ),
     ("nav_msgs/Path", "std_msgs/Header header\ngeometry_msgs/PoseStamped[] poses\n"),
     ("sensor_msgs/CompressedImage", "std_msgs/Header header\nstring format\nuint8[] data\n"),
+    (
+        "sensor_msgs/NavSatStatus",
+        "int8 STATUS_NO_FIX=-1\nint8 STATUS_FIX=0\nint8 STATUS_SBAS_FIX=1\n\
+         int8 STATUS_GBAS_FIX=2\nint8 status\n\
+         uint16 SERVICE_GPS=1\nuint16 SERVICE_GLONASS=2\nuint16 SERVICE_COMPASS=4\n\
+         uint16 SERVICE_GALILEO=8\nuint16 service\n",
+    ),
+    (
+        "sensor_msgs/NavSatFix",
+        "std_msgs/Header header\nsensor_msgs/NavSatStatus status\n\
+         float64 latitude\nfloat64 longitude\nfloat64 altitude\n\
+         float64[9] position_covariance\nuint8 COVARIANCE_TYPE_UNKNOWN=0\n\
+         uint8 COVARIANCE_TYPE_APPROXIMATED=1\nuint8 COVARIANCE_TYPE_DIAGONAL_KNOWN=2\n\
+         uint8 COVARIANCE_TYPE_KNOWN=3\nuint8 position_covariance_type\n",
+    ),
     ("visualization_msgs/UVCoordinate", "float32 u\nfloat32 v\n"),
     ("visualization_msgs/MeshFile", "string filename\nuint8[] data\n"),
     ("visualization_msgs/MarkerArray", "visualization_msgs/Marker[] markers\n"),

@@ -60,6 +60,51 @@ impl Quaternion {
             w: cr * cp * cy + sr * sp * sy,
         }
     }
+
+    /// The rotation of a frame given by its axes in another: unit vectors at right angles, the
+    /// third one the vector product of the first two (Shepperd 1978).
+    pub(crate) fn from_axes(x: [f64; 3], y: [f64; 3], z: [f64; 3]) -> Self {
+        let trace = x[0] + y[1] + z[2];
+        let part = |sum: f64| 0.5 * (1.0 + sum).max(0.0).sqrt();
+        let [w, qx, qy, qz] = [
+            part(trace),
+            part(2.0 * x[0] - trace),
+            part(2.0 * y[1] - trace),
+            part(2.0 * z[2] - trace),
+        ];
+        Self {
+            x: qx.copysign(y[2] - z[1]),
+            y: qy.copysign(z[0] - x[2]),
+            z: qz.copysign(x[1] - y[0]),
+            w,
+        }
+    }
+
+    /// The vector turned by this rotation.
+    pub(crate) fn turn(self, v: Vector3) -> Vector3 {
+        let Self { x, y, z, w } = self;
+        let t = Vector3 {
+            x: 2.0 * (y * v.z - z * v.y),
+            y: 2.0 * (z * v.x - x * v.z),
+            z: 2.0 * (x * v.y - y * v.x),
+        };
+        Vector3 {
+            x: v.x + w * t.x + y * t.z - z * t.y,
+            y: v.y + w * t.y + z * t.x - x * t.z,
+            z: v.z + w * t.z + x * t.y - y * t.x,
+        }
+    }
+
+    /// The rotation `other` as seen from the frame turned by this one.
+    pub(crate) fn inverse_times(self, other: Self) -> Self {
+        let (a, b) = (self, other);
+        Self {
+            x: a.w * b.x - a.x * b.w - a.y * b.z + a.z * b.y,
+            y: a.w * b.y - a.y * b.w - a.z * b.x + a.x * b.z,
+            z: a.w * b.z - a.z * b.w - a.x * b.y + a.y * b.x,
+            w: a.w * b.w + a.x * b.x + a.y * b.y + a.z * b.z,
+        }
+    }
 }
 
 /// `geometry_msgs/msg/Pose`.
@@ -67,6 +112,15 @@ impl Quaternion {
 pub(crate) struct Pose {
     pub(crate) position: Vector3,
     pub(crate) orientation: Quaternion,
+}
+
+impl Pose {
+    /// A point of the body (m ahead, left and up of its origin) in the pose's frame.
+    pub(crate) fn point(&self, ahead: f64, left: f64, up: f64) -> Vector3 {
+        let turned = self.orientation.turn(Vector3 { x: ahead, y: left, z: up });
+        let Vector3 { x, y, z } = self.position;
+        Vector3 { x: x + turned.x, y: y + turned.y, z: z + turned.z }
+    }
 }
 
 /// `geometry_msgs/msg/PoseStamped`.
@@ -142,58 +196,29 @@ pub(crate) struct Path {
     pub(crate) poses: Vec<PoseStamped>,
 }
 
-/// `std_msgs/msg/ColorRGBA`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub(crate) struct Color {
-    pub(crate) r: f32,
-    pub(crate) g: f32,
-    pub(crate) b: f32,
-    pub(crate) a: f32,
+/// `sensor_msgs/msg/NavSatStatus`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub(crate) struct NavSatStatus {
+    /// 0: a fix without augmentation.
+    pub(crate) status: i8,
+    /// Bits of the satellite systems used; 0: not known.
+    pub(crate) service: u16,
 }
 
-/// `sensor_msgs/msg/CompressedImage`; always empty here.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(crate) struct CompressedImage {
-    header: Header,
-    format: &'static str,
-    data: Vec<u8>,
-}
-
-/// `visualization_msgs/msg/MeshFile`; always empty here.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(crate) struct MeshFile {
-    filename: &'static str,
-    data: Vec<u8>,
-}
-
-/// `visualization_msgs/msg/Marker`.
+/// `sensor_msgs/msg/NavSatFix`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct Marker {
+pub(crate) struct NavSatFix {
     pub(crate) header: Header,
-    pub(crate) ns: &'static str,
-    pub(crate) id: i32,
-    pub(crate) marker_type: i32,
-    pub(crate) action: i32,
-    pub(crate) pose: Pose,
-    pub(crate) scale: Vector3,
-    pub(crate) color: Color,
-    pub(crate) lifetime: Stamp,
-    pub(crate) frame_locked: bool,
-    pub(crate) points: Vec<Vector3>,
-    pub(crate) colors: Vec<Color>,
-    pub(crate) texture_resource: &'static str,
-    pub(crate) texture: CompressedImage,
-    pub(crate) uv_coordinates: Vec<(f32, f32)>,
-    pub(crate) text: &'static str,
-    pub(crate) mesh_resource: &'static str,
-    pub(crate) mesh_file: MeshFile,
-    pub(crate) mesh_use_embedded_materials: bool,
-}
-
-/// `visualization_msgs/msg/MarkerArray`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct MarkerArray {
-    pub(crate) markers: Vec<Marker>,
+    pub(crate) status: NavSatStatus,
+    /// Degrees, positive north.
+    pub(crate) latitude: f64,
+    /// Degrees, positive east.
+    pub(crate) longitude: f64,
+    /// m above the ellipsoid.
+    pub(crate) altitude: f64,
+    pub(crate) position_covariance: [f64; 9],
+    /// 0: not known.
+    pub(crate) position_covariance_type: u8,
 }
 
 macro_rules! names {
@@ -211,5 +236,42 @@ names! {
     TfMessage: "tf2_msgs" / "TFMessage";
     Odometry: "nav_msgs" / "Odometry";
     Path: "nav_msgs" / "Path";
-    MarkerArray: "visualization_msgs" / "MarkerArray";
+    NavSatFix: "sensor_msgs" / "NavSatFix";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(a: Vector3, b: [f64; 3]) -> bool {
+        [a.x - b[0], a.y - b[1], a.z - b[2]].iter().all(|d| d.abs() < 1e-12)
+    }
+
+    #[test]
+    fn yaw_pitch_and_roll_turn_as_iso_8855_says() {
+        let ahead = Vector3 { x: 1.0, y: 0.0, z: 0.0 };
+        let left = Vector3 { x: 0.0, y: 1.0, z: 0.0 };
+        let turned = |y, p, r, v| Quaternion::from_yaw_pitch_roll(y, p, r).turn(v);
+        assert!(near(turned(0.3, 0.0, 0.0, ahead), [0.3_f64.cos(), 0.3_f64.sin(), 0.0]));
+        assert!(near(turned(0.0, 0.1, 0.0, ahead), [0.1_f64.cos(), 0.0, -0.1_f64.sin()]));
+        assert!(near(turned(0.0, 0.0, 0.2, left), [0.0, 0.2_f64.cos(), 0.2_f64.sin()]));
+    }
+
+    #[test]
+    fn a_rotation_is_that_of_its_axes_and_its_inverse_undoes_it() {
+        let q = Quaternion::from_yaw_pitch_roll(2.6, -0.4, 0.9);
+        let axis = |x, y, z| {
+            let v = q.turn(Vector3 { x, y, z });
+            [v.x, v.y, v.z]
+        };
+        let same =
+            Quaternion::from_axes(axis(1.0, 0.0, 0.0), axis(0.0, 1.0, 0.0), axis(0.0, 0.0, 1.0));
+        let none = q.inverse_times(same);
+        assert!((none.w.abs() - 1.0).abs() < 1e-12, "{none:?}");
+        let other = Quaternion::from_yaw_pitch_roll(2.9, -0.1, 0.0);
+        let v = Vector3 { x: 1.0, y: 2.0, z: 3.0 };
+        let twice = q.turn(q.inverse_times(other).turn(v));
+        let once = other.turn(v);
+        assert!(near(twice, [once.x, once.y, once.z]));
+    }
 }
