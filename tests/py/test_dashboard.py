@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shutil
@@ -123,7 +124,7 @@ def test_the_truck_moves_and_the_plots_fill(
         )
         start_km, before = shown(page, "station"), page.locator("#view").screenshot()
         page.wait_for_function(
-            "document.querySelectorAll('#strips .scatterlayer .trace').length === 7"
+            "document.querySelectorAll('#strips .scatterlayer .trace').length === 8"
         )
         page.wait_for_function(
             "document.getElementById('strips').data?.find(t => t.name === 'speed').x.length > 150"
@@ -215,10 +216,216 @@ def test_a_late_viewer_gets_the_plots_from_the_start(
         page.wait_for_function(
             "document.getElementById('strips').data?.find(t => t.name === 'speed').x.length > 50"
         )
-        first = page.evaluate("document.getElementById('strips').data[2].x[0]")
+        first = page.evaluate("document.getElementById('strips').data[3].x[0]")
         assert first < 0.06
         assert run.get("/api/v1/summary")["end_reason"] == "time_over"
         assert run.finish() == 0
+
+
+def plots_are_there(page: Page) -> None:
+    """Waits for the strip plots to be drawn with some rows."""
+    page.wait_for_function(
+        "document.getElementById('strips').data?.find(t => t.name === 'speed').x.length > 5"
+    )
+
+
+@pytest.mark.parametrize("size", [(1024, 640), (1280, 800)])
+def test_everything_is_seen_at_once_and_the_map_covers_no_vehicle(
+    server: Path, page: Page, tmp_path: Path, size: tuple[int, int]
+) -> None:
+    """At 1024 x 640 the plots began below the screen; the small map lay over the road ahead."""
+    width, height = size
+    page.set_viewport_size({"width": width, "height": height})
+    with running(server, tmp_path, "--pace", "20") as run:
+        page.goto(run.url)
+        plots_are_there(page)
+        assert page.evaluate("document.documentElement.scrollHeight") <= height
+        box = {
+            name: page.locator(name).bounding_box()
+            for name in ("#strips", ".view", "#map", "#ahead")
+        }
+        strips, view, small_map = box["#strips"], box[".view"], box["#map"]
+        assert strips is not None and view is not None and small_map is not None
+        assert strips["height"] > 220 and strips["y"] + strips["height"] <= height
+        assert small_map["y"] + small_map["height"] <= view["y"]
+        clipped = page.evaluate(
+            "[...document.querySelectorAll('.tile b, .facts dd, .controls *')]"
+            ".filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth > 0)"
+            ".map(e => e.textContent)"
+        )
+        assert clipped == []
+
+
+def test_the_vehicle_ahead_is_named_with_gap_and_times(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    with running(server, tmp_path, "--pace", "20") as run:
+        page.goto(run.url)
+        page.wait_for_function("document.getElementById('lead').textContent[0] === '#'")
+        page.click("#play")
+        page.wait_for_function(
+            "document.getElementById('state').textContent === 'paused'"
+        )
+        settled_time_s(run)
+        state = run.get("/api/v1/state")
+        lead, ego = state["lead"], state["ego"]
+        other = next(n for n in state["neighbours"] if n["id"] == lead["id"])
+        apart = math.dist((ego["x_m"], ego["y_m"]), (other["x_m"], other["y_m"]))
+        nose = run.get("/api/v1/road")["truck"]["tractor_front_m"]
+        bumpers = apart - nose - other["length_m"] / 2
+        assert lead["gap_m"] == pytest.approx(bumpers, rel=0.01, abs=1.0)
+        assert lead["time_gap_s"] == pytest.approx(
+            lead["gap_m"] / ego["speed_m_s"], abs=0.02
+        )
+        assert page.inner_text("#lead").startswith(f"#{lead['id']}, ")
+        assert page.inner_text("#gap") == f"{lead['gap_m']:.0f} m"
+        assert page.inner_text("#time-gap") == f"{lead['time_gap_s']:.1f} s"
+        assert page.inner_text("#maneuver") in (
+            "Keeps its lane",
+            "Changes to the left lane",
+            "Changes to the right lane",
+        )
+
+
+def test_a_refused_lane_change_says_why(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    with running(server, tmp_path, "highway-empty", "--decider", "external") as run:
+        page.goto(run.url)
+        page.wait_for_function("!document.getElementById('right').disabled")
+        assert page.is_hidden("#refusal")
+        page.click("#right")
+        page.wait_for_selector("#refusal", state="visible")
+        assert "there is no lane on that side" in page.inner_text("#refusal")
+
+
+def test_the_speed_planned_ahead_is_drawn_and_kept_to(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    with running(server, tmp_path, "highway-empty", "--pace", "20") as run:
+        page.goto(run.url)
+        plots_are_there(page)
+        before = page.locator("#ahead").screenshot()
+        ahead = run.get("/api/v1/state")["speed_ahead"]
+        assert ahead["step_m"] * len(ahead["speed_m_s"]) > 400.0
+        assert all(0.0 < v < 40.0 for v in ahead["speed_m_s"])
+        page.wait_for_timeout(1500)
+        assert page.locator("#ahead").screenshot() != before
+        legend = page.locator(".legend > span").all_inner_texts()
+        assert [name.strip() for name in legend] == [
+            "speed",
+            "plan",
+            "set speed",
+            "limit",
+        ]
+        drawn = page.evaluate(
+            "document.getElementById('strips').data.filter(t => t.yaxis === 'y').map(t => t.name)"
+        )
+        assert sorted(drawn) == ["limit", "plan", "set speed", "speed"]
+
+
+def test_the_plots_show_a_minute_five_or_all_by_keyboard(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    with running(
+        server, tmp_path, "--pace", "max", "--duration", "400", "--keep-open"
+    ) as run:
+        page.goto(run.url)
+        page.wait_for_function(
+            "document.getElementById('state').textContent === 'finished'"
+        )
+        plots_are_there(page)
+
+        def shown_km() -> tuple[float, float]:
+            low, high = page.evaluate(
+                "document.getElementById('strips').layout.xaxis.range"
+            )
+            return low, high
+
+        rows = page.evaluate(
+            "({s: document.getElementById('strips').data.find(t => t.name === 'speed').x})"
+        )["s"]
+        low, high = shown_km()
+        assert low == 0.0 and high >= 14.9
+        page.focus("input[name=window][value='all']")
+        page.keyboard.press("ArrowLeft")
+        assert page.is_checked("input[name=window][value='300']")
+        five = shown_km()
+        page.keyboard.press("ArrowLeft")
+        one = shown_km()
+        run_km = run.get("/api/v1/state")["ego"]["s_m"] / 1000
+        assert rows[0] < five[0] < one[0] < run_km < one[1] < five[1] < high
+        mean_km_s = (run_km - rows[0]) / 400
+        assert one[1] - one[0] == pytest.approx(1.2 * 60 * mean_km_s, rel=0.3)
+        assert run.finish() == 0
+
+
+def luminance(page: Page, element: str) -> float:
+    """Brightness of an element's ground, 0 to 255."""
+    ground = page.evaluate(
+        f"getComputedStyle(document.querySelector('{element}')).backgroundColor"
+    )
+    return sum(float(v) for v in re.findall(r"[\d.]+", ground)[:3]) / 3
+
+
+def contrast(page: Page, element: str) -> float:
+    """Contrast of an element's text on its ground (WCAG 2.2)."""
+    script = """(selector) => {
+      const rgb = (text) => text.match(/[\\d.]+/g).map(Number);
+      const light = (c) => c.slice(0, 3).map((v) => v / 255)
+        .map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+        .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+      let node = document.querySelector(selector);
+      const text = rgb(getComputedStyle(node).color);
+      let ground = rgb(getComputedStyle(node).backgroundColor);
+      while (ground[3] === 0) {
+        node = node.parentElement;
+        ground = rgb(getComputedStyle(node).backgroundColor);
+      }
+      const [a, b] = [light(text), light(ground)].sort((x, y) => y - x);
+      return (a + 0.05) / (b + 0.05);
+    }"""
+    return float(page.evaluate(script, element))
+
+
+def test_light_and_dark_follow_the_system_or_the_choice_and_can_be_read(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    with running(server, tmp_path, "--pace", "10") as run:
+        page.emulate_media(color_scheme="light")
+        page.goto(run.url)
+        plots_are_there(page)
+        assert luminance(page, "body") > 200
+        page.emulate_media(color_scheme="dark")
+        assert luminance(page, "body") < 40
+        page.focus("#theme")
+        page.keyboard.press("Enter")
+        assert page.inner_text("#theme") == "Theme: light"
+        for element in (
+            "#speed",
+            "#speed-sub",
+            ".legend span",
+            "#maneuver",
+            ".facts dt",
+        ):
+            assert contrast(page, element) >= 4.5, element
+        assert luminance(page, "body") > 200
+        page.wait_for_function(
+            "document.getElementById('strips').layout.paper_bgcolor === '#ffffff'"
+        )
+        page.reload()
+        assert luminance(page, "body") > 200, "the choice is kept"
+        page.keyboard.press("t")
+        assert page.inner_text("#theme") == "Theme: dark"
+        assert luminance(page, "body") < 40
+        for element in (
+            "#speed",
+            "#speed-sub",
+            ".legend span",
+            "#maneuver",
+            ".facts dt",
+        ):
+            assert contrast(page, element) >= 4.5, element
 
 
 def test_the_page_fits_a_small_screen(server: Path, page: Page, tmp_path: Path) -> None:
@@ -226,7 +433,7 @@ def test_the_page_fits_a_small_screen(server: Path, page: Page, tmp_path: Path) 
     with running(server, tmp_path, "--pace", "10") as run:
         page.goto(run.url)
         page.wait_for_function(
-            "document.querySelectorAll('#strips .trace').length === 7"
+            "document.querySelectorAll('#strips .trace').length === 8"
         )
         width = page.evaluate("document.documentElement.scrollWidth")
         assert width <= 390

@@ -206,6 +206,12 @@ impl World {
         &self.scenario
     }
 
+    /// The planning stack.
+    #[must_use]
+    pub const fn stack(&self) -> &Stack {
+        &self.stack
+    }
+
     /// The planning stack (to request a lane change from outside, say).
     pub const fn stack_mut(&mut self) -> &mut Stack {
         &mut self.stack

@@ -8,10 +8,18 @@ use axum::response::{IntoResponse, Response};
 use crate::picture::plotly_js;
 
 const HTML: &str = include_str!("page/index.html");
-const STYLE: &str = include_str!("page/style.css");
-const APP: &str = include_str!("page/app.js");
-const VIEW: &str = include_str!("page/view.js");
-const STRIPS: &str = include_str!("page/strips.js");
+/// Style sheets and modules of the page by path.
+const FILES: [(&str, &str, &str); 9] = [
+    ("/assets/theme.css", STYLE, include_str!("page/theme.css")),
+    ("/assets/style.css", STYLE, include_str!("page/style.css")),
+    ("/assets/app.js", SCRIPT, include_str!("page/app.js")),
+    ("/assets/ahead.js", SCRIPT, include_str!("page/ahead.js")),
+    ("/assets/minimap.js", SCRIPT, include_str!("page/minimap.js")),
+    ("/assets/strips.js", SCRIPT, include_str!("page/strips.js")),
+    ("/assets/theme.js", SCRIPT, include_str!("page/theme.js")),
+    ("/assets/view.js", SCRIPT, include_str!("page/view.js")),
+    ("/assets/words.js", SCRIPT, include_str!("page/words.js")),
+];
 
 static PLOTLY: LazyLock<String> = LazyLock::new(plotly_js);
 
@@ -26,12 +34,8 @@ pub(super) fn asset(path: &str, report: bool) -> Option<Response> {
     let (kind, body): (_, &'static str) = match path {
         "/" if report => ("text/html; charset=utf-8", HTML_WITH_REPORT.as_str()),
         "/" => ("text/html; charset=utf-8", HTML),
-        "/assets/style.css" => ("text/css; charset=utf-8", STYLE),
-        "/assets/app.js" => (SCRIPT, APP),
-        "/assets/view.js" => (SCRIPT, VIEW),
-        "/assets/strips.js" => (SCRIPT, STRIPS),
         "/assets/plotly.js" => (SCRIPT, PLOTLY.as_str()),
-        _ => return None,
+        _ => FILES.iter().find(|f| f.0 == path).map(|f| (f.1, f.2))?,
     };
     Some(
         ([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-cache")], body).into_response(),
@@ -39,3 +43,4 @@ pub(super) fn asset(path: &str, report: bool) -> Option<Response> {
 }
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";

@@ -2,12 +2,12 @@
 
 use road::Road;
 use serde::Serialize;
-use sim::Summary;
 use tractrix_core::{
     EgoState, GuardReason, LaneChangeRefusal, Maneuver, Neighbour, Plan, PlanStatus, RPM_PER_RAD_S,
     Scene, Time, VehicleClass,
 };
 
+use super::ahead::{Lead, SpeedAhead};
 use super::strip::round;
 use crate::driver::{Pace, RunState};
 use crate::provenance::Provenance;
@@ -24,6 +24,9 @@ pub(super) struct Frame<'a> {
     pub(super) ego: Ego,
     pub(super) road: Here,
     pub(super) plan: Planned<'a>,
+    /// The vehicle ahead.
+    pub(super) lead: Option<Lead>,
+    pub(super) speed_ahead: SpeedAhead,
     pub(super) neighbours: Vec<Other>,
 }
 
@@ -44,31 +47,16 @@ pub(super) struct Run<'a> {
     pub(super) guard_activations: u64,
     pub(super) max_lateral_error_m: f64,
     pub(super) min_time_to_collision_s: Option<f64>,
+    pub(super) set_speed_m_s: f64,
+    /// The last lane change that was wished and not driven.
+    pub(super) last_refusal: Option<Refused>,
 }
 
-impl<'a> Run<'a> {
-    pub(super) fn new(
-        (scenario, external_decider): (&'a str, bool),
-        state: RunState,
-        pace: Pace,
-        realtime_factor: f64,
-        summary: &Summary,
-    ) -> Self {
-        Self {
-            scenario,
-            state,
-            external_decider,
-            pace,
-            realtime_factor: round(realtime_factor, 100.0),
-            distance_m: round(summary.distance_m, 10.0),
-            mean_speed_m_s: round(summary.mean_speed_m_s, 1e3),
-            lane_changes: summary.lane_changes,
-            collisions: summary.collisions,
-            guard_activations: summary.guard_activations,
-            max_lateral_error_m: round(summary.max_lateral_error_m, 1e4),
-            min_time_to_collision_s: summary.min_time_to_collision_s.map(|t| round(t, 100.0)),
-        }
-    }
+/// A lane change that was wished and not driven.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(super) struct Refused {
+    pub(super) reason: LaneChangeRefusal,
+    pub(super) time_s: f64,
 }
 
 /// The truck.
@@ -219,4 +207,5 @@ pub(super) struct Snapshot {
     pub(super) ego: EgoState,
     pub(super) plan: Plan,
     pub(super) scene: Scene,
+    pub(super) last_refusal: Option<Refused>,
 }

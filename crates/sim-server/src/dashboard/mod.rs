@@ -4,6 +4,7 @@
 //! columns in [`Shared`]; it never waits for a viewer. Each viewer takes the latest frame when it
 //! can (frames between are lost to it) and all columns since its last visit (none are lost).
 
+mod ahead;
 mod api;
 mod assets;
 mod frame;

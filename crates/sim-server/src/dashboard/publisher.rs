@@ -6,11 +6,13 @@ use std::time::Duration;
 use planner::decider::DeciderKind;
 use road::Road;
 use serde::Serialize;
-use sim::{Scenario, Summary};
+use sim::{Scenario, Summary, World};
 use tractrix_core::{Recorder, Tick};
 
 use super::Shared;
-use super::frame::{Ego, Frame, Here, Other, Planned, Run, Snapshot};
+use super::ahead::{Lead, SpeedAhead};
+use super::frame::{Ego, Frame, Here, Other, Planned, Refused, Run, Snapshot};
+use super::strip::round;
 use crate::driver::{Pace, RunState};
 use crate::provenance::Provenance;
 
@@ -60,36 +62,42 @@ impl Publisher {
     }
 
     /// Publishes the last tick with the run's state.
-    pub(crate) fn publish(
-        &mut self,
-        state: RunState,
-        pace: Pace,
-        wall: Duration,
-        summary: &Summary,
-    ) {
+    pub(crate) fn publish(&mut self, state: RunState, pace: Pace, wall: Duration, world: &World) {
         let Some(tick) = &self.snapshot else { return };
         let (wall_s, time_s) = (wall.as_secs_f64(), tick.now.seconds());
         if wall_s - self.mark.0 >= FACTOR_WINDOW_S {
             self.realtime_factor = (time_s - self.mark.1) / (wall_s - self.mark.0);
             self.mark = (wall_s, time_s);
         }
+        let summary = world.summary();
         let frame = Frame {
             provenance: self.provenance,
             kind: "frame",
             time_s,
-            run: Run::new(
-                (&self.scenario, self.external_decider),
+            run: Run {
+                scenario: &self.scenario,
                 state,
+                external_decider: self.external_decider,
                 pace,
-                self.realtime_factor,
-                summary,
-            ),
+                realtime_factor: round(self.realtime_factor, 100.0),
+                distance_m: round(summary.distance_m, 10.0),
+                mean_speed_m_s: round(summary.mean_speed_m_s, 1e3),
+                lane_changes: summary.lane_changes,
+                collisions: summary.collisions,
+                guard_activations: summary.guard_activations,
+                max_lateral_error_m: round(summary.max_lateral_error_m, 1e4),
+                min_time_to_collision_s: summary.min_time_to_collision_s.map(|t| round(t, 100.0)),
+                set_speed_m_s: round(world.stack().config().set_speed_m_s, 1e2),
+                last_refusal: tick.last_refusal,
+            },
             ego: Ego::from(&tick.ego),
             road: Here::new(&self.road, &tick.ego, tick.plan.lane),
             plan: Planned::from(&tick.plan),
+            lead: Lead::of(&tick.plan, &tick.ego, &tick.scene, world.geometry().front_m),
+            speed_ahead: SpeedAhead::of(&tick.plan, world.stack().speed_plan(), tick.ego.s_m),
             neighbours: tick.scene.neighbours.iter().map(Other::from).collect(),
         };
-        let so_far = SummarySoFar { provenance: self.provenance, summary };
+        let so_far = SummarySoFar { provenance: self.provenance, summary: &summary };
         if let (Ok(frame), Ok(so_far)) =
             (serde_json::to_string(&frame), serde_json::to_string(&so_far))
         {
@@ -111,8 +119,11 @@ impl Recorder for Publisher {
         kept.ego = *tick.ego;
         kept.plan.clone_from(tick.plan);
         kept.scene.clone_from(tick.scene);
+        if let Some(reason) = tick.plan.refusal {
+            kept.last_refusal = Some(Refused { reason, time_s: tick.now.seconds() });
+        }
         let mut strip = self.shared.strip();
-        if strip.is_due(tick.ego.s_m) {
+        if strip.is_due(tick) {
             strip.push(tick);
         }
     }

@@ -3,12 +3,14 @@
 use serde::Serialize;
 use tractrix_core::Tick;
 
-/// Distance between two rows, m.
+/// Distance between two rows, m, and time, s: a row is due when either has passed.
 const SPACING_M: f64 = 10.0;
+const SPACING_S: f64 = 5.0;
 
-/// The columns since the start of the run, one row per [`SPACING_M`].
+/// The columns since the start of the run.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct Strip {
+    time_s: Vec<f64>,
     s_m: Vec<f64>,
     speed_m_s: Vec<f64>,
     reference_speed_m_s: Vec<f64>,
@@ -24,14 +26,19 @@ impl Strip {
         self.s_m.len()
     }
 
-    /// Whether a row is due at this station.
-    pub(crate) fn is_due(&self, s_m: f64) -> bool {
-        self.s_m.last().is_none_or(|last| s_m >= last + SPACING_M)
+    /// Whether a row is due.
+    pub(crate) fn is_due(&self, tick: &Tick<'_>) -> bool {
+        let passed = |column: &[f64], now: f64, spacing: f64| {
+            column.last().is_none_or(|last| now >= last + spacing)
+        };
+        passed(&self.s_m, tick.ego.s_m, SPACING_M)
+            || passed(&self.time_s, tick.now.seconds(), SPACING_S)
     }
 
     /// Adds a row.
     pub(crate) fn push(&mut self, tick: &Tick<'_>) {
         let p = &tick.ego.powertrain;
+        self.time_s.push(round(tick.now.seconds(), 100.0));
         self.s_m.push(round(tick.ego.s_m, 10.0));
         self.speed_m_s.push(round(tick.ego.speed_m_s, 1e3));
         self.reference_speed_m_s.push(round(tick.plan.reference_speed_m_s, 1e3));
@@ -45,6 +52,7 @@ impl Strip {
     pub(crate) fn rows_from(&self, first: usize) -> Self {
         let tail = |column: &[f64]| column.get(first..).unwrap_or_default().to_vec();
         Self {
+            time_s: tail(&self.time_s),
             s_m: tail(&self.s_m),
             speed_m_s: tail(&self.speed_m_s),
             reference_speed_m_s: tail(&self.reference_speed_m_s),

@@ -202,7 +202,7 @@ impl Drive {
         };
         self.job.progress.show(&self.job.world);
         if let Some(publisher) = &mut self.job.publisher {
-            publisher.publish(state, self.pacer.pace(), now, &self.job.world.summary());
+            publisher.publish(state, self.pacer.pace(), now, &self.job.world);
         }
     }
 }

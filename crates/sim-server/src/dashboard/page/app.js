@@ -1,14 +1,21 @@
-// The dashboard: takes frames from /ws, fills the header and tiles, feeds view and strip plots.
-import { BirdView } from "/assets/view.js";
+// The dashboard: takes frames from /ws, fills the header and tiles, feeds views and strip plots.
+import { Ahead } from "/assets/ahead.js";
+import { MiniMap } from "/assets/minimap.js";
 import { Strips } from "/assets/strips.js";
+import { nextTheme, onTheme, theme } from "/assets/theme.js";
+import { BirdView } from "/assets/view.js";
+import * as words from "/assets/words.js";
 
 const $ = (id) => document.getElementById(id);
 const text = (id, value) => { const e = $(id); if (e.textContent !== value) e.textContent = value; };
-const KMH = 3.6;
+const { KMH, signed } = words;
 const DIESEL_G_PER_L = 832;
+const REFUSAL_SHOWN_S = 10;
 
 const road = await (await fetch("/api/v1/road")).json();
-const view = new BirdView($("view"), $("map"), road);
+const view = new BirdView($("view"), road);
+const ahead = new Ahead($("ahead"), road);
+const map = new MiniMap($("map"), road);
 const strips = new Strips($("strips"), road);
 let frame = null;
 
@@ -20,7 +27,9 @@ function connect() {
     if (message.kind === "frame") {
       frame = message;
       view.push(frame);
-      strips.moveTo(frame.ego.s_m);
+      ahead.push(frame);
+      map.draw(frame.ego);
+      strips.moveTo(frame);
       show(frame);
     } else if (message.kind === "strip") {
       strips.append(message);
@@ -36,8 +45,8 @@ function connect() {
 }
 
 // -- header and tiles ----------------------------------------------------------------------------
+const limit = (v) => v * KMH < 999 ? (v * KMH).toFixed(0) : "none";
 const clock = (s) => `${Math.floor(s / 60)}:${(s % 60).toFixed(1).padStart(4, "0")}`;
-const words = (name) => name.replaceAll("_", " ");
 
 function show(f) {
   const { ego, plan, run, road: here } = f;
@@ -53,32 +62,70 @@ function show(f) {
   text("factor", run.state === "running" ? `${run.realtime_factor.toFixed(run.realtime_factor < 20 ? 1 : 0)}×` : "");
 
   text("speed", (ego.speed_m_s * KMH).toFixed(1));
-  text("speed-sub", `target ${(plan.target_speed_m_s * KMH).toFixed(0)} · ref ${(plan.reference_speed_m_s * KMH).toFixed(0)} · limit ${(here.speed_limit_m_s * KMH).toFixed(0)}`);
+  text("speed-sub", `plan ${(plan.target_speed_m_s * KMH).toFixed(0)} · limit ${limit(here.speed_limit_m_s)}`);
   text("gear", ego.gear === 0 ? "N" : String(ego.gear));
   text("gear-sub", ego.shift_in_progress ? "shifting" : `${ego.engine_speed_rpm.toFixed(0)} rpm`);
   text("station", (ego.s_m / 1000).toFixed(2));
   text("station-sub", `of ${(road.length_m / 1000).toFixed(1)} · ${signed(here.grade_frac * 100, 1)} %`);
   $("station-bar").style.width = `${(100 * ego.s_m / road.length_m).toFixed(2)}%`;
   text("error", signed(plan.lateral_error_m * 100, 1));
-  text("error-sub", `max ${(run.max_lateral_error_m * 100).toFixed(1)}`);
-  text("hitch", signed(ego.articulation_rad * 180 / Math.PI, 2));
-  text("hitch-sub", `steer ${signed(ego.steering_wheel_rad * 180 / Math.PI, 0)}°`);
+  text("error-sub", `hitch ${signed(ego.articulation_rad * 180 / Math.PI, 1)}°`);
   text("power", (ego.engine_power_w / 1000).toFixed(0));
-  text("power-sub", braking(ego) || `pedal ${(plan.accelerator_pedal_frac * 100).toFixed(0)} % · ${ego.engine_torque_nm.toFixed(0)} Nm`);
+  text("power-sub", braking(ego) || `pedal ${(plan.accelerator_pedal_frac * 100).toFixed(0)} %`);
   text("fuel", (ego.fuel_used_g / 1000).toFixed(2));
   const km = run.distance_m / 1000;
   text("fuel-sub", km > 0.2 ? `${(ego.fuel_used_g / DIESEL_G_PER_L / km * 100).toFixed(1)} l/100 km` : `${ego.fuel_rate_g_s.toFixed(1)} g/s`);
   const active = plan.guard.length > 0;
   $("guard-tile").classList.toggle("alert", active);
   text("guard", active ? "active" : "clear");
-  text("guard-sub", active ? plan.guard.map(words).join(", ") : `${run.guard_activations} ticks so far`);
-  text("maneuver", [words(plan.maneuver), plan.following !== null ? `following #${plan.following}` : "free", plan.refusal ? `refused: ${words(plan.refusal)}` : ""].filter(Boolean).join(" · "));
+  text("guard-sub", active ? plan.guard.map(words.guard).join(", ") : `${run.guard_activations} ticks`);
+  decision(f);
+  traffic(f);
+  against(f.ghost);
+  banner(run);
 }
 
-const signed = (value, digits) => {
-  const shown = value.toFixed(digits);
-  return Number(shown) === 0 ? (0).toFixed(digits) : value > 0 ? `+${shown}` : shown.replace("-", "−");
-};
+// What the truck does and why.
+function decision({ plan, run, time_s }) {
+  text("maneuver", words.maneuver(plan.maneuver));
+  text("speed-by", words.speedBy(plan));
+  const ago = run.last_refusal ? time_s - run.last_refusal.time_s : Infinity;
+  $("refusal").hidden = ago > REFUSAL_SHOWN_S;
+  if (ago <= REFUSAL_SHOWN_S) text("refusal", `No lane change ${ago < 1 ? "now" : `${ago.toFixed(0)} s ago`}: ${words.refusal(run.last_refusal.reason)}`);
+}
+
+function traffic({ lead }) {
+  text("lead", lead ? `#${lead.id}, ${(lead.speed_m_s * KMH).toFixed(0)} km/h` : "none");
+  text("gap", lead ? `${lead.gap_m.toFixed(0)} m` : "–");
+  text("time-gap", lead?.time_gap_s != null ? `${lead.time_gap_s.toFixed(1)} s` : "–");
+  text("ttc", lead?.time_to_collision_s == null ? "–" : lead.time_to_collision_s > 99 ? "> 99 s" : `${lead.time_to_collision_s.toFixed(0)} s`);
+}
+
+// The same truck under cruise control without traffic, both at the truck's place.
+function against(ghost) {
+  $("ghost-tile").hidden = !ghost;
+  if (!ghost) return;
+  const percent = (frac) => frac == null ? "–" : signed(frac * 100, 1);
+  const kg = (g) => (g / 1000).toFixed(2);
+  text("saving", percent(ghost.saving_frac));
+  text("saving-free", ghost.held_up_s > 0 ? `free road ${percent(ghost.free_saving_frac)} %` : "");
+  text("saving-sub", `${kg(ghost.ego_fuel_g)} / ${kg(ghost.fuel_g)} kg · ${signed(ghost.ego_time_s - ghost.time_s, 0)} s · traffic ${ghost.held_up_s.toFixed(0)} s`);
+  $("ghost-tile").title = "Fuel saved at equal trip time and speed against the same truck under cruise control (up to 5 km/h "
+    + "faster downhill) on an empty road. Time lost behind others counts against the truck; \"free road\" leaves out the "
+    + `stretches on which traffic held it up (${ghost.held_up_s.toFixed(0)} s, ${(ghost.held_up_m / 1000).toFixed(1)} km).`;
+}
+
+// What must not happen, for as long as the run lasts.
+function banner(run) {
+  const said = [];
+  if (run.off_road) said.push("A wheel is off the road.");
+  else if (run.off_road_events > 0) said.push(`Off the road ${times(run.off_road_events)}, ${run.off_road_time_s.toFixed(1)} s.`);
+  if (run.collisions > 0) said.push(`Collided ${times(run.collisions)}.`);
+  $("banner").hidden = said.length === 0;
+  text("banner", said.join(" "));
+}
+
+const times = (count) => count === 1 ? "once" : `${count} times`;
 
 function braking(ego) {
   const parts = [];
@@ -105,10 +152,17 @@ $("left").onclick = () => change("left");
 $("right").onclick = () => change("right");
 $("step").onclick = step;
 $("pace").onchange = (e) => { send({ action: "pace", pace: e.target.value }); e.target.blur(); };
+$("theme").onclick = nextTheme;
+onTheme(() => text("theme", `Theme: ${theme()}`));
+for (const choice of document.getElementsByName("window")) choice.onchange = () => strips.setWindow(choice.value);
 $("in").onclick = () => view.zoomBy(1.35);
 $("out").onclick = () => view.zoomBy(1 / 1.35);
 addEventListener("keydown", (e) => {
-  if (e.target instanceof HTMLSelectElement || e.target instanceof HTMLButtonElement || $("play").disabled) return;
+  if (e.target instanceof HTMLSelectElement || e.target instanceof HTMLInputElement || e.ctrlKey || e.metaKey || e.altKey) return;
+  if (e.key === "t") nextTheme();
+  if (e.key === "+") view.zoomBy(1.35);
+  if (e.key === "-") view.zoomBy(1 / 1.35);
+  if (e.target instanceof HTMLButtonElement || $("play").disabled) return;
   if (e.key === " ") { e.preventDefault(); toggle(); }
   if (e.key === ".") step();
   if (e.key === "ArrowLeft" && frame?.run.external_decider) change("left");

@@ -1,21 +1,24 @@
 // Bird's-eye view: the road from its lane borders, tractor and trailer with wheels, traffic, plan.
 // The truck stays in place and drives to the right; map coordinates are metres, y to the left.
+import { onTheme, palette } from "/assets/theme.js";
+import { KMH } from "/assets/words.js";
 
-const COLOR = {
-  ground: "#0c1116", dot: "#2a3744", verge: "#10191a", asphalt: "#272e37", ramp: "#222932", shoulder: "#1c2229", paint: "#c9d3dd",
-  tractor: "#2f9df4", cab: "#0f4f86", trailer: "#c8d2dc", edge: "#0a0e13", wheel: "#040608", rim: "#6d7a88", frame: "#41566a",
-  car: "#f0a742", van: "#c98bea", truck: "#8fa3b8", followed: "#ff5d6c", path: "#39c5ff", text: "#8b99a8",
-};
+const NAMES = [
+  "view-ground", "view-dot", "verge", "asphalt", "ramp", "shoulder", "paint", "tractor", "cab", "trailer", "trailer-line",
+  "edge", "wheel", "rim", "frame", "car", "van", "truck", "glass", "plan", "accent", "dim", "text", "label-ground", "ghost",
+];
+const FONT = "system-ui, 'DejaVu Sans', sans-serif";
 const BEHIND = 0.34; // the truck's place across the canvas
+const LABEL_SCALE = 4; // vehicles are named from so many pixels a metre on
 
 export class BirdView {
-  constructor(canvas, map, road) {
+  constructor(canvas, road) {
     this.canvas = canvas;
     this.ctx = canvas.getContext("2d");
     this.road = road;
     this.zoom = 1;
     this.frames = [];
-    this.minimap = new MiniMap(map, road);
+    onTheme(() => { this.colors = palette(NAMES); });
     canvas.addEventListener("wheel", (e) => { e.preventDefault(); this.zoomBy(Math.exp(-e.deltaY * 0.0015)); }, { passive: false });
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
@@ -49,17 +52,18 @@ export class BirdView {
     const pose = (p, q) => ({ ...q, x_m: mix(p.x_m, q.x_m), y_m: mix(p.y_m, q.y_m), yaw_rad: mix(p.yaw_rad, q.yaw_rad) });
     const ego = pose(a.ego, b.ego);
     for (const key of ["s_m", "articulation_rad", "road_wheel_rad"]) ego[key] = mix(a.ego[key], b.ego[key]);
-    return { ego, plan: b.plan, others: b.neighbours.map((n) => pose(before.get(n.id) ?? n, n)) };
+    const ghost = b.ghost && pose(a.ghost ?? b.ghost, b.ghost);
+    return { ego, plan: b.plan, ghost, lead: b.lead?.id, others: b.neighbours.map((n) => pose(before.get(n.id) ?? n, n)) };
   }
 
   draw() {
     const { ctx, ratio, width, height } = this;
     ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ctx.fillStyle = COLOR.ground;
+    ctx.fillStyle = this.colors["view-ground"];
     ctx.fillRect(0, 0, width, height);
     if (this.frames.length === 0 || width === 0) return;
-    const { ego, plan, others } = this.state();
-    const scale = this.scale = Math.max(width, 500) / 135 * this.zoom;
+    const { ego, plan, ghost, lead, others } = this.state();
+    const scale = this.scale = Math.max(width, 500) / 110 * this.zoom;
     // screen from map: translate to the truck, turn by its heading, y up to y down
     const cos = Math.cos(ego.yaw_rad), sin = Math.sin(ego.yaw_rad);
     this.px = (x, y) => {
@@ -71,10 +75,10 @@ export class BirdView {
     this.drawDots(ego);
     this.drawRoad(window);
     this.drawPath(plan, ego);
-    for (const other of others) this.drawOther(other, other.id === plan.following);
+    for (const other of others) this.drawOther(other, other.id === lead);
     this.drawTruck(ego);
+    if (ghost) this.drawGhost(ghost, ego);
     this.drawScale();
-    this.minimap.draw(ego);
   }
 
   // Dots fixed to the map, so that motion is seen beside the road.
@@ -82,7 +86,7 @@ export class BirdView {
     const { ctx, width, height, scale } = this;
     const step = scale > 5 ? 10 : scale > 1.5 ? 50 : 200;
     const reach = Math.hypot(width, height) / scale;
-    ctx.fillStyle = COLOR.dot;
+    ctx.fillStyle = this.colors["view-dot"];
     for (let x = Math.floor((ego.x_m - reach) / step) * step; x < ego.x_m + reach; x += step) {
       for (let y = Math.floor((ego.y_m - reach) / step) * step; y < ego.y_m + reach; y += step) {
         const [px, py] = this.px(x, y);
@@ -106,19 +110,19 @@ export class BirdView {
       ctx.closePath();
     };
     const seen = road.lanes.map((lane) => [lane, range(lane)]).filter(([, [first, last]]) => last > first);
-    ctx.strokeStyle = COLOR.verge;
+    ctx.strokeStyle = this.colors.verge;
     ctx.lineWidth = 11 * this.scale;
     ctx.lineJoin = "round";
     for (const [lane, span] of seen) { outline(lane, span); ctx.stroke(); }
     for (const [lane, span] of seen) {
-      ctx.fillStyle = lane.kind === "driving" ? COLOR.asphalt : lane.kind === "shoulder" ? COLOR.shoulder : COLOR.ramp;
+      ctx.fillStyle = lane.kind === "driving" ? this.colors.asphalt : lane.kind === "shoulder" ? this.colors.shoulder : this.colors.ramp;
       ctx.strokeStyle = ctx.fillStyle;
       ctx.lineWidth = 1;
       outline(lane, span);
       ctx.fill();
       ctx.stroke();
     }
-    ctx.strokeStyle = COLOR.paint;
+    ctx.strokeStyle = this.colors.paint;
     ctx.lineWidth = Math.max(1, 0.16 * this.scale);
     for (const [lane, [first, last]] of seen) {
       for (const marking of lane.markings) {
@@ -145,8 +149,8 @@ export class BirdView {
   drawPosts(from, to) {
     const { ctx, road } = this;
     const step = this.scale > 2.5 ? 50 : this.scale > 0.8 ? 100 : 500;
-    ctx.fillStyle = COLOR.text;
-    ctx.font = "11px system-ui, sans-serif";
+    ctx.fillStyle = this.colors.dim;
+    ctx.font = `11px ${FONT}`;
     ctx.textAlign = "center";
     for (let s = Math.ceil(Math.max(0, from) / step) * step; s <= Math.min(to, road.length_m); s += step) {
       let low = null;
@@ -175,8 +179,8 @@ export class BirdView {
     if (visible.length < 3) return;
     const end = visible[visible.length - 1];
     const fade = ctx.createLinearGradient(front, 0, Math.max(front + 1, end[0]), 0);
-    fade.addColorStop(0, COLOR.path);
-    fade.addColorStop(1, `${COLOR.path}30`);
+    fade.addColorStop(0, this.colors.plan);
+    fade.addColorStop(1, `color-mix(in srgb, ${this.colors.plan} 20%, transparent)`);
     ctx.strokeStyle = fade;
     ctx.lineCap = ctx.lineJoin = "round";
     for (const [width, alpha] of [[2.4 * this.scale, 0.13], [Math.max(1.6, 0.22 * this.scale), 0.95]]) {
@@ -204,7 +208,7 @@ export class BirdView {
 
   box(ctx, rear, front, width, radius, fill) {
     ctx.fillStyle = fill;
-    ctx.strokeStyle = COLOR.edge;
+    ctx.strokeStyle = this.colors.edge;
     ctx.lineWidth = 0.08;
     ctx.beginPath();
     ctx.roundRect(rear, -width / 2, front - rear, width, radius);
@@ -214,8 +218,8 @@ export class BirdView {
 
   axle(ctx, x, width, twin, angle = 0) {
     const tyre = twin ? 0.56 : 0.34;
-    ctx.fillStyle = COLOR.wheel;
-    ctx.strokeStyle = COLOR.rim;
+    ctx.fillStyle = this.colors.wheel;
+    ctx.strokeStyle = this.colors.rim;
     ctx.lineWidth = 0.07;
     for (const side of [-1, 1]) {
       ctx.save();
@@ -234,103 +238,105 @@ export class BirdView {
     const hx = ego.x_m + t.hitch_m * Math.cos(ego.yaw_rad), hy = ego.y_m + t.hitch_m * Math.sin(ego.yaw_rad);
     const cabLength = 2.3;
     this.onBody(ego.x_m, ego.y_m, ego.yaw_rad, (ctx) => {
-      this.box(ctx, t.tractor_rear_m, t.tractor_front_m - 0.3, 0.9, 0.1, COLOR.frame);
+      this.box(ctx, t.tractor_rear_m, t.tractor_front_m - 0.3, 0.9, 0.1, this.colors.frame);
       for (const x of t.drive_axles_m) this.axle(ctx, x, t.width_m, true);
       this.axle(ctx, t.steer_axle_m, t.width_m, false, ego.road_wheel_rad);
     });
     this.onBody(hx, hy, ego.yaw_rad + ego.articulation_rad, (ctx) => {
       for (const x of t.trailer_axles_m) this.axle(ctx, x, t.width_m + 0.1, true);
       ctx.globalAlpha = 0.72;
-      this.box(ctx, t.trailer_rear_m, t.trailer_front_m, t.width_m, 0.12, COLOR.trailer);
+      this.box(ctx, t.trailer_rear_m, t.trailer_front_m, t.width_m, 0.12, this.colors.trailer);
       ctx.globalAlpha = 1;
-      ctx.strokeStyle = "#9aa7b4";
+      ctx.strokeStyle = this.colors["trailer-line"];
       ctx.lineWidth = 0.05;
       ctx.beginPath();
       for (let x = t.trailer_rear_m + 1.6; x < t.trailer_front_m - 0.5; x += 1.6) { ctx.moveTo(x, -t.width_m / 2 + 0.1); ctx.lineTo(x, t.width_m / 2 - 0.1); }
       ctx.stroke();
-      ctx.fillStyle = COLOR.edge;
+      ctx.fillStyle = this.colors.edge;
       ctx.beginPath();
       ctx.arc(0, 0, 0.2, 0, 2 * Math.PI);
       ctx.fill();
     });
     this.onBody(ego.x_m, ego.y_m, ego.yaw_rad, (ctx) => {
       const front = t.tractor_front_m;
-      this.box(ctx, front - cabLength, front, t.width_m, 0.35, COLOR.tractor);
-      ctx.fillStyle = COLOR.cab;
+      this.box(ctx, front - cabLength, front, t.width_m, 0.35, this.colors.tractor);
+      ctx.fillStyle = this.colors.cab;
       ctx.beginPath();
       ctx.roundRect(front - 0.75, -t.width_m / 2 + 0.2, 0.5, t.width_m - 0.4, 0.15);
       ctx.fill();
     });
   }
 
-  drawOther(n, followed) {
-    const fill = followed ? COLOR.followed : COLOR[n.class] ?? COLOR.car;
+  drawOther(n, isLead) {
+    const { ctx, colors, scale } = this;
     this.onBody(n.x_m, n.y_m, n.yaw_rad, (ctx) => {
       const half = n.length_m / 2;
       const round = n.class === "car" ? 0.55 : 0.25;
-      this.box(ctx, -half, half, n.width_m, round, fill);
-      ctx.fillStyle = "rgb(8 12 17 / .55)";
+      this.box(ctx, -half, half, n.width_m, round, colors[n.class] ?? colors.car);
+      ctx.fillStyle = colors.glass;
       const glass = n.class === "car" ? [half * 0.28, half * 0.3] : [half - 0.95, 0.6];
       ctx.fillRect(glass[0], -n.width_m / 2 + 0.18, glass[1], n.width_m - 0.36);
       if (n.class === "car") ctx.fillRect(-half * 0.72, -n.width_m / 2 + 0.22, half * 0.25, n.width_m - 0.44);
+      if (!isLead) return;
+      ctx.strokeStyle = colors.accent;
+      ctx.lineWidth = Math.max(0.25, 2 / scale);
+      ctx.beginPath();
+      ctx.roundRect(-half - 0.3, -n.width_m / 2 - 0.3, n.length_m + 0.6, n.width_m + 0.6, round);
+      ctx.stroke();
     });
-    if (this.scale > 3) {
-      const [x, y] = this.px(n.x_m, n.y_m);
-      this.ctx.fillStyle = followed ? COLOR.followed : COLOR.text;
-      this.ctx.font = "11px system-ui, sans-serif";
-      this.ctx.textAlign = "center";
-      this.ctx.fillText((n.speed_m_s * 3.6).toFixed(0), x, y - n.width_m / 2 * this.scale - 5);
+    if (scale < LABEL_SCALE && !isLead) return;
+    const [x, y] = this.px(n.x_m, n.y_m);
+    if (x < -40 || x > this.width + 40) return;
+    ctx.font = `${isLead ? "600 " : ""}11px ${FONT}`;
+    ctx.textAlign = "center";
+    ctx.lineJoin = "round";
+    ctx.lineWidth = 3;
+    ctx.strokeStyle = colors["label-ground"];
+    ctx.fillStyle = isLead ? colors.text : colors.dim;
+    const label = `#${n.id} ${(n.speed_m_s * KMH).toFixed(0)}`, at = y - n.width_m / 2 * scale - 5;
+    ctx.strokeText(label, x, at);
+    ctx.fillText(label, x, at);
+  }
+
+  // The same truck under cruise control: an outline, or where it is when it is out of sight.
+  drawGhost(ghost, ego) {
+    const { ctx, colors, width, scale } = this;
+    const t = this.road.truck, rear = t.hitch_m + t.trailer_rear_m;
+    const [x, y] = this.px(ghost.x_m, ghost.y_m);
+    const apart = ghost.s_m - ego.s_m, seen = x + t.tractor_front_m * scale > 0 && x + rear * scale < width;
+    const label = `cruise control ${(ghost.speed_m_s * KMH).toFixed(0)}`;
+    ctx.strokeStyle = ctx.fillStyle = colors.ghost;
+    ctx.font = `11px ${FONT}`;
+    if (!seen) {
+      const text = `${label}: ${Math.abs(apart).toFixed(0)} m ${apart > 0 ? "ahead ▸" : "behind"}`;
+      ctx.textAlign = apart > 0 ? "right" : "left";
+      ctx.fillText(apart > 0 ? text : `◂ ${text}`, apart > 0 ? width - 10 : 10, 18);
+      return;
     }
+    this.onBody(ghost.x_m, ghost.y_m, ghost.yaw_rad, (ctx) => {
+      ctx.lineWidth = 1.6 / scale;
+      ctx.setLineDash([0.9, 0.6]);
+      ctx.beginPath();
+      ctx.roundRect(t.tractor_front_m - 2.3, -t.width_m / 2, 2.3, t.width_m, 0.3);
+      ctx.roundRect(rear, -t.width_m / 2, t.trailer_front_m - t.trailer_rear_m, t.width_m, 0.12);
+      ctx.stroke();
+    });
+    ctx.setLineDash([]);
+    ctx.textAlign = "center";
+    ctx.fillText(label, x, y + t.width_m / 2 * scale + 14);
   }
 
   drawScale() {
     const { ctx, height } = this;
     const length = [5, 10, 20, 50, 100, 200, 500, 1000].find((m) => m * this.scale > 70) ?? 1000;
     const w = length * this.scale, x = 14, y = height - 16;
-    ctx.strokeStyle = ctx.fillStyle = COLOR.text;
+    ctx.strokeStyle = ctx.fillStyle = this.colors.dim;
     ctx.lineWidth = 1.5;
     ctx.beginPath();
     ctx.moveTo(x, y - 5); ctx.lineTo(x, y); ctx.lineTo(x + w, y); ctx.lineTo(x + w, y - 5);
     ctx.stroke();
-    ctx.font = "11px system-ui, sans-serif";
+    ctx.font = `11px ${FONT}`;
     ctx.textAlign = "left";
     ctx.fillText(`${length} m`, x + w + 7, y + 1);
-  }
-}
-
-// The whole road with the truck's place on it.
-class MiniMap {
-  constructor(canvas, road) {
-    this.canvas = canvas;
-    this.x = road.profile.x_m;
-    this.y = road.profile.y_m;
-    this.box = [Math.min(...this.x), Math.max(...this.x), Math.min(...this.y), Math.max(...this.y)];
-  }
-
-  draw(ego) {
-    const { canvas, x, y, box: [x0, x1, y0, y1] } = this;
-    const ratio = devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
-    if (canvas.width !== Math.round(width * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    const ctx = canvas.getContext("2d");
-    ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-    ctx.clearRect(0, 0, width, height);
-    const margin = 12;
-    const scale = Math.min((width - 2 * margin) / Math.max(1, x1 - x0), (height - 2 * margin) / Math.max(1, y1 - y0));
-    const px = (mx, my) => [width / 2 + scale * (mx - (x0 + x1) / 2), height / 2 - scale * (my - (y0 + y1) / 2)];
-    ctx.strokeStyle = "#5a6877";
-    ctx.lineWidth = 2;
-    ctx.lineJoin = "round";
-    ctx.beginPath();
-    for (let i = 0; i < x.length; i++) ctx.lineTo(...px(x[i], y[i]));
-    ctx.stroke();
-    ctx.fillStyle = "#39c5ff";
-    ctx.strokeStyle = "#0b0f14";
-    ctx.beginPath();
-    ctx.arc(...px(ego.x_m, ego.y_m), 4.5, 0, 2 * Math.PI);
-    ctx.fill();
-    ctx.stroke();
   }
 }
