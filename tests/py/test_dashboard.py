@@ -117,7 +117,7 @@ def clock_s(page: Page) -> float:
 def test_the_truck_moves_and_the_plots_fill(
     server: Path, page: Page, tmp_path: Path
 ) -> None:
-    with running(server, tmp_path, "--pace", "20") as run:
+    with running(server, tmp_path, "--pace", "5") as run:
         page.goto(run.url)
         page.wait_for_function(
             "document.getElementById('state').textContent === 'running'"
@@ -166,7 +166,7 @@ def settled_time_s(run: Run) -> float:
 def test_pause_step_play_and_pace_do_what_they_say(
     server: Path, page: Page, tmp_path: Path
 ) -> None:
-    with running(server, tmp_path, "--duration", "30") as run:
+    with running(server, tmp_path, "--duration", "90") as run:
         page.goto(run.url)
         page.wait_for_function(
             "document.getElementById('state').textContent === 'running'"
@@ -195,7 +195,7 @@ def test_pause_step_play_and_pace_do_what_they_say(
         page.wait_for_function(
             "document.getElementById('state').textContent === 'finished'"
         )
-        assert clock_s(page) == pytest.approx(30.0, abs=0.06)
+        assert clock_s(page) == pytest.approx(90.0, abs=0.06)
         assert run.process.wait(timeout=30) == 0
     assert (
         json.loads((tmp_path / "summary.json").read_text())["end_reason"] == "time_over"

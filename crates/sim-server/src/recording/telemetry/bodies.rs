@@ -141,11 +141,9 @@ mod tests {
     #[test]
     fn a_body_lies_on_the_surface_whatever_its_heading() {
         let road = road::builtin::test_site();
-        let s_m = (0..300)
-            .map(|i| f64::from(i) * 10.0)
-            .find(|&s| road.at(s, 0.0).grade_rad.abs() > 0.01)
-            .unwrap();
+        let s_m = 807.0;
         let at = road.at(s_m, 0.0);
+        assert!(at.grade_rad.abs() > 0.01);
         for turn_rad in [0.0, 0.04, -0.3, 1.2] {
             let yaw_rad = at.heading_rad + turn_rad;
             let q = on_road(&road, s_m, 0.0, yaw_rad);

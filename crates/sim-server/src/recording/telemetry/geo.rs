@@ -144,12 +144,12 @@ mod tests {
         for (got, want) in [up.x, up.y, up.z].into_iter().zip(normal) {
             assert!((got - want).abs() < 1e-9, "{up:?} {normal:?}");
         }
-        // Grid north is turned from true north by the convergence, asin(sin(lat)) * dlon.
+        // East of the central meridian grid north points east of true north by about dlon sin(lat).
         let north = geodesy.earth_from_map().orientation.turn(Vector3 { x: 0.0, y: 1.0, z: 0.0 });
         let east = [-lon.sin(), lon.cos(), 0.0];
         let convergence = (lon - 9.0_f64.to_radians()) * lat.sin();
         let turned = north.x * east[0] + north.y * east[1];
-        assert!((turned + convergence).abs() < 1e-4, "{turned} {convergence}");
+        assert!((turned - convergence).abs() < 1e-4, "{turned} {convergence}");
     }
 
     #[test]
