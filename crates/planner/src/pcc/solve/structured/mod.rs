@@ -4,16 +4,16 @@
 //! Numerical Optimization, ch. 14 and 16.6) on the reduced form. Per interval there are eight
 //! inequalities `c·(E_k, E_{k+1}, b_k, u_k) <= d`:
 //!
-//! | i | row | d |
+//! | name | row | d |
 //! |---|---|---|
-//! | 0 | `-p` | 0 |
-//! | 1 | `p - φ'Ē` | φ⁰ |
-//! | 2 | `b` | b_max |
-//! | 3 | `-b` | 0 |
-//! | 4 | `u` | D |
-//! | 5 | `u - p` | 0 |
-//! | 6 | `E_{k+1}` | E_max |
-//! | 7 | `-E_{k+1}` | -E_min |
+//! | [`CUT_OFF`] | `-p` | 0 |
+//! | [`FULL_LOAD`] | `p - φ'Ē` | φ⁰ |
+//! | [`HARDEST_BRAKE`] | `b` | b_max |
+//! | [`NO_BRAKE`] | `-b` | 0 |
+//! | [`KINK`] | `u` | D |
+//! | [`BELOW_TRACTION`] | `u - p` | 0 |
+//! | [`CEILING`] | `E_{k+1}` | E_max |
+//! | [`FLOOR`] | `-E_{k+1}` | -E_min |
 //!
 //! The Newton matrix `H + CᵀWC`, `W = diag(z/s)`, couples `b_k` and `u_k` with their own interval only;
 //! with these eliminated it is pentadiagonal in `E` and factors in O(N). The trip-time row is dense: it is
@@ -38,6 +38,14 @@ use super::quadratic::Quadratic;
 use super::solution::{Solution, SolveStatus};
 
 const ROWS: usize = 8;
+const CUT_OFF: usize = 0;
+const FULL_LOAD: usize = 1;
+const HARDEST_BRAKE: usize = 2;
+const NO_BRAKE: usize = 3;
+const KINK: usize = 4;
+const BELOW_TRACTION: usize = 5;
+const CEILING: usize = 6;
+const FLOOR: usize = 7;
 const MAX_ITERATIONS: u32 = 60;
 /// Complementarity at which the solve ends, g per inequality.
 const MU_END: f64 = 2e-10;
@@ -229,7 +237,7 @@ impl Structured {
         (status, used)
     }
 
-    /// Number of inequalities.
+    /// Number of inequalities: a fixed end has no bounds of its own.
     fn count(&self, fixed: bool) -> f64 {
         let mut count = (ROWS * self.rows.len()) as f64 - if fixed { 2.0 } else { 0.0 };
         self.scalars(|_| count += 1.0);
@@ -296,11 +304,11 @@ impl Structured {
             let room = room(sub, k, [e0, e1, b, u], p);
             let row = &mut self.rows[k];
             for (i, room) in room.into_iter().enumerate() {
-                row.s[i] = room.max(if i >= 6 { 0.5 } else { 0.02 });
+                row.s[i] = room.max(if i == CEILING || i == FLOOR { 0.5 } else { 0.02 });
                 row.z[i] = mu / row.s[i];
             }
             if fixed && k + 1 == n {
-                (row.z[6], row.z[7]) = (0.0, 0.0);
+                (row.z[CEILING], row.z[FLOOR]) = (0.0, 0.0);
             }
             e0 = e1;
         }
@@ -374,9 +382,10 @@ impl Structured {
         out.b_m_s2.clear();
         out.b_m_s2.extend_from_slice(&self.b);
         out.traction_price.clear();
-        out.traction_price.extend(self.rows.iter().map(|r| r.z[1] - r.z[0] - r.z[5]));
+        out.traction_price
+            .extend(self.rows.iter().map(|r| r.z[FULL_LOAD] - r.z[CUT_OFF] - r.z[BELOW_TRACTION]));
         out.cut_price.clear();
-        out.cut_price.extend(self.rows.iter().map(|r| r.z[0]));
+        out.cut_price.extend(self.rows.iter().map(|r| r.z[CUT_OFF]));
         out.beta_g_s = match time {
             TimeRule::Price(beta) => beta,
             TimeRule::AtMost(_) => self.time.map_or(0.0, |r| r.z),

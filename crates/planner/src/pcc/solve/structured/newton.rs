@@ -1,10 +1,12 @@
 //! One Newton system: residuals and reduced matrix in one sweep, directions in one sweep each.
 //!
-//! Per interval, `y` weights of its inequalities act through four sums: on the traction
-//! `P = -y0 + y1 - y5`, on the mean energy `-φ' y1`, on the brake `y2 - y3`, on `u` `y4 + y5`, and on
-//! the energy at its end `y6 - y7`.
+//! Per interval, weights of its inequalities act through four sums ([`Acting`]) and one product: on
+//! the mean energy `-φ'` times the weight of full load.
 
-use super::{ROWS, Structured};
+use super::{
+    BELOW_TRACTION, CEILING, CUT_OFF, FLOOR, FULL_LOAD, HARDEST_BRAKE, KINK, NO_BRAKE, ROWS,
+    Structured,
+};
 use crate::pcc::solve::{Subproblem, Terminal, TimeRule};
 
 /// Largest residuals and mean complementarity of a point.
@@ -18,7 +20,7 @@ pub(super) struct Residuals {
 /// Parts of an interval's Newton system that stay after `b` and `u` are eliminated.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Eliminated {
-    /// Weights of rows 4 and 5, and the inverse of their sum.
+    /// Weight of [`BELOW_TRACTION`], and the inverse of its sum with that of [`KINK`].
     w5: f64,
     inverse_u: f64,
     /// Coupling of the brake with the energies, and the inverse of its own entry.
@@ -31,9 +33,32 @@ pub(super) struct Eliminated {
 }
 
 /// Sums of row weights by what they act on.
-#[inline]
-fn gather(y: &[f64; ROWS]) -> (f64, f64, f64, f64) {
-    (y[1] - y[0] - y[5], y[2] - y[3], y[4] + y[5], y[6] - y[7])
+struct Acting {
+    traction: f64,
+    brake: f64,
+    below: f64,
+    energy: f64,
+}
+
+impl Acting {
+    #[inline]
+    fn of(y: &[f64; ROWS]) -> Self {
+        Self {
+            traction: y[FULL_LOAD] - y[CUT_OFF] - y[BELOW_TRACTION],
+            brake: y[HARDEST_BRAKE] - y[NO_BRAKE],
+            below: y[KINK] + y[BELOW_TRACTION],
+            energy: y[CEILING] - y[FLOOR],
+        }
+    }
+}
+
+/// Sums over a point's inequalities, and its largest residuals.
+struct Sums {
+    primal: f64,
+    dual: f64,
+    /// Σ s z, and the number of inequalities.
+    product: f64,
+    count: f64,
 }
 
 #[inline]
@@ -85,8 +110,21 @@ impl Structured {
         terminal: Terminal,
         time: TimeRule,
     ) -> Residuals {
-        let n = sub.n;
         let fixed = matches!(terminal, Terminal::Fixed(_));
+        self.assemble_cost(sub.n);
+        let mut sums = self.assemble_intervals(sub, fixed);
+        self.assemble_time(time, &mut sums);
+        self.assemble_soft_end(terminal, &mut sums);
+        if fixed {
+            let last = sub.n - 1;
+            (self.grad_e[last], self.base[last]) = (0.0, 0.0);
+        }
+        let dual = self.grad_e.iter().fold(sums.dual, |m, g| m.max(g.abs()));
+        Residuals { primal: sums.primal, dual, mu: sums.product / sums.count }
+    }
+
+    /// The cost alone: its gradient, its matrix, and the right-hand side against it.
+    fn assemble_cost(&mut self, n: usize) {
         self.cost_gradient(n);
         self.band.m0.copy_from_slice(&self.quad.d0);
         self.band.m1.copy_from_slice(&self.quad.d1);
@@ -94,8 +132,13 @@ impl Structured {
         for (r, g) in self.base.iter_mut().zip(&self.grad_e) {
             *r = -g;
         }
-        let (mut primals, mut sums) = ([0.0; ROWS], [0.0; ROWS]);
-        let (mut dual, mut count) = (0.0f64, (ROWS * n) as f64);
+    }
+
+    /// The inequalities of every interval, with brake and `u` eliminated.
+    fn assemble_intervals(&mut self, sub: &Subproblem, fixed: bool) -> Sums {
+        let n = sub.n;
+        let (mut primals, mut products) = ([0.0; ROWS], [0.0; ROWS]);
+        let mut dual = 0.0f64;
         // Slices of known length: no bounds to check and no pointers to read again in the sweep.
         let (rows, parts) = (&mut self.rows[..n], &mut self.parts[..n]);
         let (m0, m1) = (&mut self.band.m0[..n], &mut self.band.m1[..n]);
@@ -108,106 +151,108 @@ impl Structured {
         let (bb, q0, q1) = (&self.quad.bb[..n], &self.quad.x0[..n], &self.quad.x1[..n]);
         let mut e0 = sub.start_e;
         for k in 0..n {
-            let ended = fixed && k + 1 == n;
             let row = &mut rows[k];
             let (a0, a1, half) = (of_a0[k], of_a1[k], 0.5 * phi1[k]);
             let (e1, b, u) = (energy[k], brake[k], below[k]);
             let p = a0 * e0 + a1 * e1 + b + of_r[k];
-            let over = [
-                -p,
-                p - half * (e0 + e1) - phi0[k],
-                b - sub.b_max,
-                -b,
-                u - kink[k],
-                u - p,
-                e1 - e_max[k],
-                e_min[k] - e1,
-            ];
+            let mut over = [0.0; ROWS];
+            over[CUT_OFF] = -p;
+            over[FULL_LOAD] = p - half * (e0 + e1) - phi0[k];
+            over[HARDEST_BRAKE] = b - sub.b_max;
+            over[NO_BRAKE] = -b;
+            over[KINK] = u - kink[k];
+            over[BELOW_TRACTION] = u - p;
+            over[CEILING] = e1 - e_max[k];
+            over[FLOOR] = e_min[k] - e1;
             for (i, over) in over.into_iter().enumerate() {
                 row.inverse_s[i] = 1.0 / row.s[i];
                 row.rp[i] = over + row.s[i];
             }
-            if ended {
-                (row.rp[6], row.rp[7]) = (0.0, 0.0);
-                (row.inverse_s[6], row.inverse_s[7]) = (0.0, 0.0);
+            if fixed && k + 1 == n {
+                (row.rp[CEILING], row.rp[FLOOR]) = (0.0, 0.0);
+                (row.inverse_s[CEILING], row.inverse_s[FLOOR]) = (0.0, 0.0);
             }
             raise(&mut primals, row.rp.map(f64::abs));
-            for (sum, product) in sums.iter_mut().zip(times(&row.s, &row.z)) {
+            for (sum, product) in products.iter_mut().zip(times(&row.s, &row.z)) {
                 *sum += product;
             }
             let w = times(&row.z, &row.inverse_s);
             // Dual residual with z, right-hand side with W r_p.
-            let (zp, zb, zu, ze) = gather(&row.z);
-            let (tp, tb, tu, te) = gather(&times(&w, &row.rp));
-            let (bend_z, bend_t) = (half * row.z[1], half * w[1] * row.rp[1]);
+            let of_z = Acting::of(&row.z);
+            let of_wr = Acting::of(&times(&w, &row.rp));
+            let bend_z = half * row.z[FULL_LOAD];
+            let bend_wr = half * w[FULL_LOAD] * row.rp[FULL_LOAD];
             let own_b = grad_b[k];
-            grad_e[k] += a1 * zp - bend_z + ze;
-            grad_b[k] = own_b + zp + zb;
-            let right_u = discount[k] - tu;
-            let of_u = zu - discount[k];
-            dual = dual.max(grad_b[k].abs()).max(of_u.abs());
-            // u eliminated: row 5 becomes a weight on p, in series with row 4.
-            let inverse_u = 1.0 / (w[4] + w[5]);
-            let wp = w[0] + w[4] * w[5] * inverse_u;
-            let share_u = w[5] * inverse_u * right_u;
-            let (f0, f1) = (a0 - half, a1 - half);
-            let inverse_b = 1.0 / (bb[k] + wp + w[1] + w[2] + w[3]);
-            let x1 = q1[k] + wp * a1 + w[1] * f1;
-            let right_b = share_u - own_b - tp - tb;
+            grad_e[k] += a1 * of_z.traction - bend_z + of_z.energy;
+            grad_b[k] = own_b + of_z.traction + of_z.brake;
+            let right_u = discount[k] - of_wr.below;
+            let left_u = of_z.below - discount[k];
+            dual = dual.max(grad_b[k].abs()).max(left_u.abs());
+            // u eliminated: its bound by the traction becomes a weight on p, in series with the kink's.
+            let inverse_u = 1.0 / (w[KINK] + w[BELOW_TRACTION]);
+            let wp = w[CUT_OFF] + w[KINK] * w[BELOW_TRACTION] * inverse_u;
+            let share_u = w[BELOW_TRACTION] * inverse_u * right_u;
+            let (f0, f1, wf) = (a0 - half, a1 - half, w[FULL_LOAD]);
+            let inverse_b = 1.0 / (bb[k] + wp + wf + w[HARDEST_BRAKE] + w[NO_BRAKE]);
+            let x1 = q1[k] + wp * a1 + wf * f1;
+            let right_b = share_u - own_b - of_wr.traction - of_wr.brake;
             let share_b = inverse_b * right_b;
-            m0[k] += wp * a1 * a1 + w[1] * f1 * f1 + w[6] + w[7] - x1 * x1 * inverse_b;
-            base[k] += a1 * (share_u - tp) + bend_t - te - x1 * share_b;
+            let bounds = wp * a1 * a1 + wf * f1 * f1 + w[CEILING] + w[FLOOR];
+            m0[k] += bounds - x1 * x1 * inverse_b;
+            base[k] += a1 * (share_u - of_wr.traction) + bend_wr - of_wr.energy - x1 * share_b;
             let mut x0 = 0.0;
             if k > 0 {
-                x0 = q0[k] + wp * a0 + w[1] * f0;
-                grad_e[k - 1] += a0 * zp - bend_z;
-                base[k - 1] += a0 * (share_u - tp) + bend_t - x0 * share_b;
-                m0[k - 1] += wp * a0 * a0 + w[1] * f0 * f0 - x0 * x0 * inverse_b;
-                m1[k - 1] += wp * a0 * a1 + w[1] * f0 * f1 - x0 * x1 * inverse_b;
+                x0 = q0[k] + wp * a0 + wf * f0;
+                grad_e[k - 1] += a0 * of_z.traction - bend_z;
+                base[k - 1] += a0 * (share_u - of_wr.traction) + bend_wr - x0 * share_b;
+                m0[k - 1] += wp * a0 * a0 + wf * f0 * f0 - x0 * x0 * inverse_b;
+                m1[k - 1] += wp * a0 * a1 + wf * f0 * f1 - x0 * x1 * inverse_b;
             }
-            parts[k] = Eliminated { w5: w[5], inverse_u, x0, x1, inverse_b, right_u, right_b };
+            let w5 = w[BELOW_TRACTION];
+            parts[k] = Eliminated { w5, inverse_u, x0, x1, inverse_b, right_u, right_b };
             e0 = e1;
         }
-        let (mut primal, mut sum) = (largest(&primals), sums.iter().sum::<f64>());
-        if fixed {
-            count -= 2.0;
+        let count = (ROWS * n) as f64 - if fixed { 2.0 } else { 0.0 };
+        Sums { primal: largest(&primals), dual, product: products.iter().sum::<f64>(), count }
+    }
+
+    /// The longest duration, a dense row: all but its matrix, which [`Self::border`] brings in.
+    fn assemble_time(&mut self, time: TimeRule, sums: &mut Sums) {
+        let (Some(row), TimeRule::AtMost(t)) = (&mut self.time, time) else { return };
+        let lasts = self.known_time_s + self.t.iter().zip(&self.e).map(|(t, e)| t * e).sum::<f64>();
+        row.rp = lasts + row.s - t;
+        sums.primal = sums.primal.max(row.rp.abs());
+        let pull = -row.weight() * row.rp;
+        for ((g, r), t) in self.grad_e.iter_mut().zip(&mut self.base).zip(&self.t) {
+            *g += row.z * t;
+            *r += pull * t;
         }
-        if let (Some(row), TimeRule::AtMost(t)) = (&mut self.time, time) {
-            let lasts =
-                self.known_time_s + self.t.iter().zip(&self.e).map(|(t, e)| t * e).sum::<f64>();
-            row.rp = lasts + row.s - t;
-            primal = primal.max(row.rp.abs());
-            let pull = -row.weight() * row.rp;
-            for ((g, r), t) in self.grad_e.iter_mut().zip(&mut self.base).zip(&self.t) {
-                *g += row.z * t;
-                *r += pull * t;
-            }
-            sum += row.s * row.z;
-            count += 1.0;
-        }
-        if let (Some(end), Terminal::Soft { reference, pay, credit }) = (&mut self.soft, terminal) {
-            let last = n - 1;
-            end.own.rp = end.own.s - end.slack;
-            end.spare.rp = end.spare.s - end.slack - self.e[last] + reference;
-            primal = primal.max(end.own.rp.abs()).max(end.spare.rp.abs());
-            self.grad_e[last] -= credit + end.spare.z;
-            self.base[last] += credit;
-            let left = pay - credit - end.own.z - end.spare.z;
-            dual = dual.max(left.abs());
-            let (w7, w8) = (end.own.weight(), end.spare.weight());
-            // Predictor: multipliers fall out of the right-hand sides.
-            end.right = -(pay - credit) + w7 * end.own.rp + w8 * end.spare.rp;
-            self.base[last] += w8 * end.spare.rp - w8 / (w7 + w8) * end.right;
-            self.band.m0[last] += w8 - w8 * w8 / (w7 + w8);
-            sum += end.own.s * end.own.z + end.spare.s * end.spare.z;
-            count += 2.0;
-        }
-        if fixed {
-            self.grad_e[n - 1] = 0.0;
-            self.base[n - 1] = 0.0;
-        }
-        dual = self.grad_e.iter().fold(dual, |m, g| m.max(g.abs()));
-        Residuals { primal, dual, mu: sum / count }
+        sums.product += row.s * row.z;
+        sums.count += 1.0;
+    }
+
+    /// A soft end, its slack eliminated.
+    fn assemble_soft_end(&mut self, terminal: Terminal, sums: &mut Sums) {
+        let (Some(end), Terminal::Soft { reference, pay, credit }) = (&mut self.soft, terminal)
+        else {
+            return;
+        };
+        let last = self.e.len() - 1;
+        end.own.rp = end.own.s - end.slack;
+        end.spare.rp = end.spare.s - end.slack - self.e[last] + reference;
+        sums.primal = sums.primal.max(end.own.rp.abs()).max(end.spare.rp.abs());
+        self.grad_e[last] -= credit + end.spare.z;
+        self.base[last] += credit;
+        let left = pay - credit - end.own.z - end.spare.z;
+        sums.dual = sums.dual.max(left.abs());
+        let (of_own, of_spare) = (end.own.weight(), end.spare.weight());
+        // Predictor: multipliers fall out of the right-hand sides.
+        end.right = -(pay - credit) + of_own * end.own.rp + of_spare * end.spare.rp;
+        let share = of_spare / (of_own + of_spare);
+        self.base[last] += of_spare * end.spare.rp - share * end.right;
+        self.band.m0[last] += of_spare - of_spare * of_spare / (of_own + of_spare);
+        sums.product += end.own.s * end.own.z + end.spare.s * end.spare.z;
+        sums.count += 2.0;
     }
 
     /// Factors the reduced matrix; false if a pivot is not positive.
@@ -238,7 +283,7 @@ impl Structured {
         let (parts, rows, de) = (&self.parts[..n], &mut self.rows[..n], &self.de[..n]);
         for k in 0..n {
             let (part, row, de) = (&parts[k], &mut rows[k], de[k]);
-            let (_, _, step) = part.recover([a0[k], a1[k], 0.5 * phi1[k]], before, de);
+            let step = part.recover([a0[k], a1[k], 0.5 * phi1[k]], before, de).of_rows;
             let mut ratios = [0.0; ROWS];
             for i in 0..ROWS {
                 let ds = -row.rp[i] - step[i];
@@ -274,15 +319,15 @@ impl Structured {
                 row.dz[i] = row.ds[i] * row.dz[i] - target;
             }
             let y = times(&row.dz, &row.inverse_s);
-            let (yp, yb, yu, ye) = gather(&y);
-            let bend = 0.5 * phi1[k] * y[1];
-            let share_u = part.w5 * part.inverse_u * yu;
-            let on_b = yp + yb + share_u;
-            part.right_u += yu;
+            let of_y = Acting::of(&y);
+            let bend = 0.5 * phi1[k] * y[FULL_LOAD];
+            let share_u = part.w5 * part.inverse_u * of_y.below;
+            let on_b = of_y.traction + of_y.brake + share_u;
+            part.right_u += of_y.below;
             part.right_b += on_b;
             let share_b = part.inverse_b * on_b;
-            let on_p = yp + share_u;
-            base[k] += a1[k] * on_p - bend + ye - part.x1 * share_b;
+            let on_p = of_y.traction + share_u;
+            base[k] += a1[k] * on_p - bend + of_y.energy - part.x1 * share_b;
             if k > 0 {
                 base[k - 1] += a0[k] * on_p - bend - part.x0 * share_b;
             }
@@ -316,8 +361,9 @@ impl Structured {
         let (db, du) = (&mut self.db[..n], &mut self.du[..n]);
         for k in 0..n {
             let (part, row, de) = (&parts[k], &mut rows[k], de[k]);
-            let step;
-            (db[k], du[k], step) = part.recover([a0[k], a1[k], 0.5 * phi1[k]], before, de);
+            let found = part.recover([a0[k], a1[k], 0.5 * phi1[k]], before, de);
+            (db[k], du[k]) = (found.db, found.du);
+            let step = found.of_rows;
             let mut ratios = [0.0; ROWS];
             for i in 0..ROWS {
                 let ds = -row.rp[i] - step[i];
@@ -365,14 +411,30 @@ impl Structured {
     }
 }
 
+/// Brake, `u` and left-hand sides of the inequalities: an interval's step.
+struct Step {
+    db: f64,
+    du: f64,
+    of_rows: [f64; ROWS],
+}
+
 impl Eliminated {
-    /// Brake, `u` and `C dx` of an interval from the steps of its energies; `[a0, a1, φ'/2]`.
+    /// An interval's step from the steps of its energies; `[a0, a1, φ'/2]`.
     #[inline]
-    fn recover(&self, [a0, a1, half]: [f64; 3], before: f64, de: f64) -> (f64, f64, [f64; ROWS]) {
+    fn recover(&self, [a0, a1, half]: [f64; 3], before: f64, de: f64) -> Step {
         let db = (self.right_b - self.x1 * de - self.x0 * before) * self.inverse_b;
         let dp = a0 * before + a1 * de + db;
         let du = (self.right_u + self.w5 * dp) * self.inverse_u;
         let bend = half * (before + de);
-        (db, du, [-dp, dp - bend, db, -db, du, du - dp, de, -de])
+        let mut of_rows = [0.0; ROWS];
+        of_rows[CUT_OFF] = -dp;
+        of_rows[FULL_LOAD] = dp - bend;
+        of_rows[HARDEST_BRAKE] = db;
+        of_rows[NO_BRAKE] = -db;
+        of_rows[KINK] = du;
+        of_rows[BELOW_TRACTION] = du - dp;
+        of_rows[CEILING] = de;
+        of_rows[FLOOR] = -de;
+        Step { db, du, of_rows }
     }
 }

@@ -9,7 +9,7 @@
 
 use alloc::vec::Vec;
 
-use super::{ROWS, Scalar, SoftEnd, Structured, room};
+use super::{CEILING, FLOOR, ROWS, Scalar, SoftEnd, Structured, room};
 use crate::pcc::solve::{Subproblem, Terminal, TimeRule};
 
 /// Mean complementarity of a point that is kept, g per inequality.
@@ -97,7 +97,7 @@ impl Structured {
                 row.z[i] = centred(row.s[i], z[i], mu);
             }
             if fixed && k + 1 == n {
-                (row.z[6], row.z[7]) = (0.0, 0.0);
+                (row.z[CEILING], row.z[FLOOR]) = (0.0, 0.0);
             }
             e0 = e1;
         }
