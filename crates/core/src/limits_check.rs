@@ -58,8 +58,8 @@ impl VehicleLimits {
             return Err(CoreError::BadTable {
                 name: "powertrain.gear_ratios".into(),
                 why: format!(
-                    "{gears} gear ratios, {efficiencies} gear efficiencies, {masses} rotating \
-                     masses; as many of each, 1 to {MOST_GEARS}"
+                    "{gears} values, {efficiencies} in gear_efficiency_frac, {masses} in \
+                     rotating_mass_kg; as many of each, 1 to {MOST_GEARS}"
                 ),
             });
         }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use planner::decider::Policy;
-use planner::safety::{Gate, RssConfig};
+use planner::safety::{Gate, GateView, RssConfig};
 use planner::steering::{LaneChangeConfig, LateralPath, Start, plan_change};
 use planner::{DeciderKind, LaneChoice, Stack, StackConfig};
 use road::{Road, builtin};
@@ -68,7 +68,9 @@ fn planning(c: &mut Criterion) {
         let scene = scene(&road, s_m, room_m);
         c.bench_function(&format!("plan a lane change, {name}"), |b| {
             b.iter(|| {
-                let gate = Gate::new(&rss, &ego, &scene, &road, 0, 1, &limits, 0.0);
+                let (ego, scene, road, limits) = (&ego, &scene, &road, &limits);
+                let view = GateView { rss: &rss, ego, scene, road, limits, grade_rad: 0.0 };
+                let gate = Gate::new(&view, 0, 1);
                 black_box(plan_change(&config, &start, 1, &gate))
             });
         });

@@ -8,7 +8,7 @@
 mod support;
 
 use planner::pcc::solve::{
-    Programme, Solution, Structured, Subproblem, Terminal, TimeRule, clarabel,
+    Programme, Solution, Structured, Subproblem, Terminal, TimeRule, Triplets, clarabel,
 };
 use planner::pcc::trip::Trip;
 use rustix::time::{ClockId, clock_gettime};
@@ -34,8 +34,8 @@ fn times_ms(mut run: impl FnMut()) -> [f64; 2] {
     [all[0], all[RUNS / 2]]
 }
 
-fn matrix(entries: &(Vec<usize>, Vec<usize>, Vec<f64>)) -> Value {
-    json!({ "row": entries.0, "column": entries.1, "value": entries.2 })
+fn matrix(entries: &Triplets) -> Value {
+    json!({ "row": entries.row, "column": entries.column, "value": entries.value })
 }
 
 fn written(name: &str, sub: &Subproblem, end: Terminal, time: TimeRule) -> Value {

@@ -9,7 +9,7 @@ use std::cell::Cell;
 
 use planner::pcc::model::drive_profile;
 use planner::pcc::solve::{
-    CutModel, Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule,
+    CutModel, Linearisation, Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule,
 };
 use planner::pcc::trip::Trip;
 use support::{BANDS_KM_H, Engine, corpus, request, truck};
@@ -53,7 +53,8 @@ fn after_the_first_solve_neither_linearisation_nor_solution_allocates() {
     let (mut sub, mut solver, mut found) =
         (Subproblem::default(), Structured::default(), Solution::default());
     let mut solve = |e: &[f64], terminal: Terminal, time: TimeRule| {
-        sub.linearise(truck, course, &trip.tuning, e, gears, 3.0, CutModel::Hull);
+        let point = Linearisation { e_j_kg: e, gears, beta_g_s: 3.0, cut: CutModel::Hull };
+        sub.linearise(truck, course, &trip.tuning, &point);
         sub.e_max.copy_from_slice(&trip.e_max);
         for (low, e) in sub.e_min.iter_mut().zip(e) {
             *low = 0.8 * e;

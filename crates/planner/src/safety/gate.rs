@@ -92,6 +92,23 @@ impl Concern {
     }
 }
 
+/// What a gate looks at.
+#[derive(Debug, Clone, Copy)]
+pub struct GateView<'a> {
+    /// Safe gaps.
+    pub rss: &'a RssConfig,
+    /// The truck.
+    pub ego: &'a EgoState,
+    /// The others.
+    pub scene: &'a Scene,
+    /// The road.
+    pub road: &'a Road,
+    /// The truck's limits.
+    pub limits: &'a VehicleLimits,
+    /// Steepest descent ahead, rad (uphill positive).
+    pub grade_rad: f64,
+}
+
 /// The vehicles that a change from one lane to another has to do with.
 #[derive(Debug, Clone)]
 pub struct Gate {
@@ -104,16 +121,8 @@ pub struct Gate {
 impl Gate {
     /// Sorts out the scene for a change from lane `own` to lane `target`.
     #[must_use]
-    pub fn new(
-        rss: &RssConfig,
-        ego: &EgoState,
-        scene: &Scene,
-        road: &Road,
-        own: u16,
-        target: u16,
-        limits: &VehicleLimits,
-        grade_rad: f64,
-    ) -> Self {
+    pub fn new(view: &GateView<'_>, own: u16, target: u16) -> Self {
+        let GateView { rss, ego, scene, road, limits, grade_rad } = *view;
         let extent = EgoExtent::new(ego, &limits.geometry);
         let response = rss.ego_response(limits);
         let mut occupied = false;

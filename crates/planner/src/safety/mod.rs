@@ -12,7 +12,7 @@ mod guard;
 mod rss;
 mod surroundings;
 
-pub use gate::Gate;
+pub use gate::{Gate, GateView};
 pub(crate) use gate::{SpeedCourse, Strictness};
 pub use guard::GuardConfig;
 pub(crate) use guard::{GuardInput, GuardMemory, Headway, inspect, limit};

@@ -7,7 +7,7 @@ use super::lane_change::{
 };
 use super::path::{LateralPath, lane_centre};
 use crate::LaneChoice;
-use crate::safety::{Gate, RssConfig, SpeedCourse};
+use crate::safety::{Gate, GateView, RssConfig, SpeedCourse};
 use road::Road;
 use tractrix_core::{EgoState, LaneChangeRefusal, Maneuver, Scene, Time, VehicleLimits};
 
@@ -164,7 +164,8 @@ impl ManeuverPlanner {
     }
 
     fn gate(&self, at: &Situation<'_>, own: u16, target: u16) -> Gate {
-        Gate::new(&self.rss, at.ego, at.scene, at.road, own, target, at.limits, at.grade_rad)
+        let Situation { ego, scene, road, limits, grade_rad, .. } = *at;
+        Gate::new(&GateView { rss: &self.rss, ego, scene, road, limits, grade_rad }, own, target)
     }
 
     fn start<'a>(&'a self, at: &Situation<'a>) -> Start<'a> {

@@ -25,8 +25,8 @@ use crate::error::config_in;
 use crate::pcc::error::PccError;
 use crate::pcc::model::{Drive, Driven, Tuning, cruise_energies};
 use crate::pcc::solve::{
-    DefaultSolver, Iterations, Problem, Solution, SolveStatus, Subproblem, Terminal, TimeRule,
-    eco_roll, iterate,
+    DefaultSolver, Iterations, Problem, Profile, Solution, SolveStatus, Subproblem, Terminal,
+    TimeRule, eco_roll, iterate,
 };
 
 /// A plan with other gears has to be cheaper by this much, g.
@@ -347,13 +347,22 @@ impl HorizonPlanner {
         }
         let mut problem = setting.problem(known, &tuning, TimeRule::Price(beta));
         problem.start_gear = request.gear.checked_sub(1).map(Drive::Gear);
+        if self.config.eco_roll && fence.is_none() {
+            problem.may_roll = setting.may_roll(known);
+        }
         let most = self.config.sqp_iterations as usize;
         let (solver, last) = (&mut self.solver, &self.last);
         let mut run = |problem: &Problem<'_>, e: &[f64], gears: &[Drive], most: usize| {
             let iterations = Iterations { most, ..Iterations::TRIP };
-            let profile = iterate(problem, e, gears, beta, iterations, &mut |sub, end, time, f| {
+            let mut solve = |sub: &Subproblem, end, time, f: Option<&[f64]>| {
                 budget.solve(solver, sub, end, time, f)
-            });
+            };
+            let profile = if problem.may_roll.is_empty() {
+                iterate(problem, e, gears, beta, iterations, &mut solve)
+            } else {
+                eco_roll::rolled(problem, e, gears, beta, iterations, &mut solve)
+                    .unwrap_or_else(|| Profile::failed((e, gears)))
+            };
             setting.driven(problem, profile, beta)
         };
         let warm = last.as_ref().and_then(|plan| setting.moved_on(plan));
@@ -387,24 +396,9 @@ impl HorizonPlanner {
                 keep(run(&problem, &e, &gears, most), SWITCH_GAIN_G);
             }
         }
-        let Some(mut best) = best else {
+        let Some(best) = best else {
             return Err(HorizonFailure::Solver { status: failed, iterations: budget.used });
         };
-        let rolls = best.driven.drive.contains(&Drive::Neutral);
-        if self.config.eco_roll && fence.is_none() && !rolls {
-            let iterations = Iterations { most, ..Iterations::TRIP };
-            let mut again = |sub: &Subproblem, end, time, f: Option<&[f64]>| {
-                budget.solve(&mut self.solver, sub, end, time, f)
-            };
-            let open =
-                eco_roll::opened(&problem, &best.profile, &best.driven, iterations, &mut again);
-            if let Some(profile) = open {
-                let other = setting.driven(&problem, profile, beta);
-                if other.cost_g + SWITCH_GAIN_G < best.cost_g {
-                    best = other;
-                }
-            }
-        }
         let iterations = budget.used;
         Ok(HorizonPlan {
             start_s_m: setting.course.start_s_m,

@@ -11,7 +11,7 @@ use crate::pcc::model::{
     Course, Drive, Driven, MIN_SPEED_M_S, Truck, Tuning, cruise_energies, drive_profile,
 };
 use crate::pcc::search::{EngineTables, GearChoice, choose_gears};
-use crate::pcc::solve::{CutModel, Problem, Profile, Terminal, TimeRule};
+use crate::pcc::solve::{CutModel, Problem, Profile, Terminal, TimeRule, eco_roll};
 
 /// Worth of a joule at the horizon's end relative to its fuel: missing, spare.
 const END_WORTH: (f64, f64) = (1.15, 0.85);
@@ -151,6 +151,11 @@ impl Setting {
         &self.cruise
     }
 
+    /// Intervals in which the driveline may be open.
+    pub(super) fn may_roll(&self, known: &Known) -> Vec<bool> {
+        eco_roll::may_roll(&known.truck, &self.course, &self.e_max, &self.cruise)
+    }
+
     /// Makes room for the profile behind a fence; without a library solver, which alone knows
     /// elapsed times, that profile is the ceiling.
     pub(super) fn stay_behind(&mut self, fence: &Fence, lead: &LeadAhead) {
@@ -184,6 +189,7 @@ impl Setting {
             start_gear: None,
             cut: CutModel::Charged,
             forced_cut: Vec::new(),
+            may_roll: Vec::new(),
         }
     }
 

@@ -216,7 +216,7 @@ impl SearchGrid {
 
 /// Prices and limits of a search.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct SearchPrices {
+pub(crate) struct SearchPrices<'a> {
     /// Price of time, g/s.
     pub beta_g_s: f64,
     /// Fuel per shift, g.
@@ -227,6 +227,8 @@ pub(crate) struct SearchPrices {
     pub brake_m_s2: f64,
     /// Whether fuel cut-off is free, as in truth, or charged the fixed part of the map.
     pub free_cut: bool,
+    /// Intervals in which the driveline may be open (empty: in none).
+    pub may_roll: &'a [bool],
 }
 
 /// The cheapest path.
@@ -234,29 +236,36 @@ pub(crate) struct SearchPrices {
 pub(crate) struct SearchPath {
     /// Energy per node, J/kg.
     pub e_j_kg: Vec<f64>,
-    /// Gear index per interval.
-    pub gears: Vec<u8>,
+    /// Gear per interval.
+    pub gears: Vec<Drive>,
 }
 
-/// The cheapest path through the grid; `None` if there is none. `start_gear` costs a shift to leave.
+/// The cheapest path through the grid; `None` if there is none. `start` costs a shift to leave.
 #[must_use]
 pub(crate) fn search(
     truck: &Truck,
     tables: &EngineTables,
     grid: &SearchGrid,
-    prices: &SearchPrices,
-    start_gear: Option<u8>,
+    prices: &SearchPrices<'_>,
+    start: Option<Drive>,
 ) -> Option<SearchPath> {
     let n = grid.n();
     let gears = tables.on(truck, grid);
-    let m = gears.len();
+    // The open driveline takes the slot behind the gears.
+    let mut drives: Vec<Drive> = gears.iter().map(|g| Drive::Gear(g.index as u8)).collect();
+    if prices.may_roll.contains(&true) {
+        drives.push(Drive::Neutral);
+    }
+    let m = drives.len();
+    let rolling =
+        Rolling { idle_g_s: truck.idle_fuel_g_s(), inertia: truck.inertia(Drive::Neutral) };
     let lowest = grid.low.iter().copied().min()?;
     let c0 = grid.count[0] as usize;
     // Ways to the nodes of a stage: gear by gear, energies side by side.
     let mut ways = alloc::vec![Way::NONE; c0 * m];
     let first = usize::try_from(-grid.low[0]).ok().filter(|&i| i < c0)?;
-    for (slot, gear) in gears.iter().enumerate() {
-        let same = start_gear.is_none_or(|s| s as usize == gear.index);
+    for (slot, drive) in drives.iter().enumerate() {
+        let same = start.is_none_or(|s| s == *drive);
         ways[slot * c0 + first].cost_g = if same { 0.0 } else { prices.shift_fuel_g };
     }
     let mut parents: Vec<Vec<u32>> = Vec::with_capacity(n);
@@ -302,6 +311,14 @@ pub(crate) fn search(
                 let code = (i * m + came) as u32;
                 stage.expand(gear, slot, (i, e0), (base, code), sum, &of_time);
             }
+            if prices.may_roll.get(k).copied().unwrap_or(false) {
+                let slot = m - 1;
+                let own = cost_of(slot);
+                let (base, came) = if own <= shifted { (own, slot) } else { (shifted, best) };
+                let idle_g = |j: usize| rolling.idle_g_s * 2.0 * grid.h_m / (speeds[i] + after[j]);
+                let way = Way { cost_g: base, from: (i * m + came) as u32 };
+                stage.roll(rolling.inertia, slot, (i, e0), way, &of_time, idle_g);
+            }
         }
         parents.push(next.iter().map(|way| way.from).collect());
         ways = next;
@@ -314,10 +331,10 @@ pub(crate) fn search(
     let last = grid.count[n] as usize;
     let (mut at, mut slot) = (end % last, end / last);
     let mut e = alloc::vec![grid.start_e; n + 1];
-    let mut path = alloc::vec![0u8; n];
+    let mut path = alloc::vec![Drive::Neutral; n];
     for k in (0..n).rev() {
         e[k + 1] = grid.energy(k + 1, at);
-        path[k] = gears[slot].index as u8;
+        path[k] = drives[slot];
         let from = parents[k][slot * grid.count[k + 1] as usize + at] as usize;
         (at, slot) = (from / m, from % m);
     }
@@ -328,6 +345,12 @@ pub(crate) fn search(
 fn round_up(x: f64) -> i32 {
     let cut = x as i32;
     cut.saturating_add(i32::from(f64::from(cut) < x))
+}
+
+/// The truck with an open driveline.
+struct Rolling {
+    idle_g_s: f64,
+    inertia: f64,
 }
 
 /// One interval of a search.
@@ -347,6 +370,30 @@ struct Stage<'a> {
 }
 
 impl Stage<'_> {
+    /// The one edge from index `i` at energy `e0` with the driveline open: to where the truck rolls,
+    /// the end energy rounded by the dither. `way` is the cheapest so far.
+    fn roll(
+        &mut self,
+        inertia: f64,
+        slot: usize,
+        (i, e0): (usize, f64),
+        way: Way,
+        of_time: &[f64],
+        idle_g: impl Fn(usize) -> f64,
+    ) {
+        let level = self.road + self.drag_1_m * e0;
+        let slope = self.step_e * (inertia / self.h + 0.5 * self.drag_1_m);
+        let steps = round_up(self.dither - level / slope) - 1;
+        let j = (steps - (self.rise - i as i32)) as usize;
+        if j < of_time.len() {
+            let total = way.cost_g + of_time[j] + idle_g(j);
+            let to = &mut self.next[slot * of_time.len() + j];
+            if total < to.cost_g {
+                *to = Way { cost_g: total, ..way };
+            }
+        }
+    }
+
     /// All edges from index `i` at energy `e0` in one gear, at the cost `base` so far.
     fn expand(
         &mut self,

@@ -8,5 +8,5 @@
 mod gears;
 mod grid;
 
-pub(crate) use gears::{GearChoice, choose_gears};
+pub(crate) use gears::{GearChoice, choose_gears, gear_bit};
 pub(crate) use grid::{EngineTables, SearchGrid, SearchPrices, search};

@@ -82,8 +82,8 @@ impl Clarabel {
         tolerance: f64,
     ) -> Solution {
         let (m, rows) = Programme::build(sub, terminal, time, fence_s);
-        let p = CscMatrix::new_from_triplets(m.columns, m.columns, m.p.0, m.p.1, m.p.2);
-        let a = CscMatrix::new_from_triplets(m.b.len(), m.columns, m.a.0, m.a.1, m.a.2);
+        let p = CscMatrix::new_from_triplets(m.columns, m.columns, m.p.row, m.p.column, m.p.value);
+        let a = CscMatrix::new_from_triplets(m.b.len(), m.columns, m.a.row, m.a.column, m.a.value);
         let kept = self.last.take().and_then(|mut last| {
             let same = last.equalities == m.equalities
                 && last.solver.update_data(&p, &m.q, &a, &m.b).is_ok();

@@ -52,6 +52,19 @@ pub enum TimeRule {
     AtMost(f64),
 }
 
+/// What a subproblem is linearised around.
+#[derive(Debug, Clone, Copy)]
+pub struct Linearisation<'a> {
+    /// Energies per node of a driven profile, J/kg.
+    pub e_j_kg: &'a [f64],
+    /// Gears it is driven in.
+    pub gears: &'a [Drive],
+    /// Price of time, g/s.
+    pub beta_g_s: f64,
+    /// How part load below zero wheel force is charged.
+    pub cut: CutModel,
+}
+
 /// One convex subproblem. Vectors are per interval unless the name says node; reused between
 /// iterations without allocation.
 #[derive(Debug, Clone, Default)]
@@ -142,17 +155,15 @@ impl Subproblem {
         self.e_max.resize(n + 1, 0.0);
     }
 
-    /// Linearises around the energies `e` (per node) driven in `gears`, at time price `beta_g_s`.
+    /// Linearises around a driven profile.
     pub fn linearise(
         &mut self,
         truck: &Truck,
         course: &Course,
         tuning: &Tuning,
-        e: &[f64],
-        gears: &[Drive],
-        beta_g_s: f64,
-        cut: CutModel,
+        point: &Linearisation<'_>,
     ) {
+        let Linearisation { e_j_kg: e, gears, beta_g_s, cut } = *point;
         let (n, h) = (course.n(), course.h_m);
         self.resize(n);
         self.h_m = h;

@@ -24,9 +24,9 @@ mod structured;
 
 #[cfg(feature = "solver")]
 pub use clarabel::Clarabel;
-pub use lin::{Subproblem, Terminal, TimeRule};
+pub use lin::{Linearisation, Subproblem, Terminal, TimeRule};
 #[cfg(feature = "solver")]
-pub use programme::Programme;
+pub use programme::{Programme, Triplets};
 pub use solution::{Solution, SolveStatus};
 pub use solver::DefaultSolver;
 pub(crate) use sqp::refined_gears;

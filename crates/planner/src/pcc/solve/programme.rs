@@ -9,18 +9,37 @@ use alloc::vec::Vec;
 use super::lin::{Subproblem, Terminal, TimeRule};
 use super::quadratic::Quadratic;
 
+/// A sparse matrix, entry by entry.
+#[derive(Debug, Clone, Default)]
+pub struct Triplets {
+    /// Row of every entry.
+    pub row: Vec<usize>,
+    /// Column of every entry.
+    pub column: Vec<usize>,
+    /// Value of every entry.
+    pub value: Vec<f64>,
+}
+
+impl Triplets {
+    fn push(&mut self, row: usize, column: usize, value: f64) {
+        self.row.push(row);
+        self.column.push(column);
+        self.value.push(value);
+    }
+}
+
 /// A quadratic programme `min ½xᵀPx + qᵀx, Ax + s = b, s ∈ {0}^z × R₊^m` in triplets, for Clarabel
 /// and for writing out.
 #[derive(Debug, Clone, Default)]
 pub struct Programme {
     /// Number of unknowns.
     pub columns: usize,
-    /// Upper triangle of P: row, column, value.
-    pub p: (Vec<usize>, Vec<usize>, Vec<f64>),
+    /// Upper triangle of P.
+    pub p: Triplets,
     /// Linear cost.
     pub q: Vec<f64>,
-    /// A: row, column, value.
-    pub a: (Vec<usize>, Vec<usize>, Vec<f64>),
+    /// A.
+    pub a: Triplets,
     /// Right-hand side.
     pub b: Vec<f64>,
     /// Leading rows that are equalities.
@@ -37,16 +56,12 @@ pub(super) struct Rows {
 
 impl Programme {
     fn entry(&mut self, row: usize, column: usize, value: f64) {
-        self.a.0.push(row);
-        self.a.1.push(column);
-        self.a.2.push(value);
+        self.a.push(row, column, value);
     }
 
     fn cost(&mut self, row: usize, column: usize, value: f64) {
         let (i, j) = if row <= column { (row, column) } else { (column, row) };
-        self.p.0.push(i);
-        self.p.1.push(j);
-        self.p.2.push(value);
+        self.p.push(i, j, value);
     }
 
     /// Writes the subproblem as matrices. `fence_s` are earliest times per node (`-∞`: none).

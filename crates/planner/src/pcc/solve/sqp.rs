@@ -9,12 +9,14 @@
 //! chosen gears, so that it has a feasible point.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
-use super::lin::{Subproblem, Terminal, TimeRule};
+use super::eco_roll;
+use super::lin::{Linearisation, Subproblem, Terminal, TimeRule};
 use super::solution::{Solution, SolveStatus};
 use crate::pcc::model::{Course, Drive, Truck, Tuning, drive_leg, drive_profile, needed_before};
 use crate::pcc::search::{
-    EngineTables, GearChoice, SearchGrid, SearchPrices, choose_gears, search,
+    EngineTables, GearChoice, SearchGrid, SearchPrices, choose_gears, gear_bit, search,
 };
 
 /// A planning problem on a course.
@@ -44,6 +46,8 @@ pub struct Problem<'a> {
     pub cut: CutModel,
     /// Intervals held at fuel cut-off (empty: none).
     pub forced_cut: Vec<bool>,
+    /// Intervals in which the driveline may be open (empty: in none).
+    pub may_roll: Vec<bool>,
 }
 
 /// How the fuel map is made convex between fuel cut-off and zero wheel force.
@@ -67,6 +71,9 @@ pub struct Iterations {
 impl Iterations {
     /// For a whole trip.
     pub const TRIP: Self = Self { most: 8, rest_m_s: 0.03 };
+    /// For a whole trip with an open driveline: there is no traction that makes up for what the
+    /// linearisation missed, so the profile has to rest closer.
+    pub const ROLLING_TRIP: Self = Self { most: 14, rest_m_s: 0.004 };
 }
 
 /// Result of the successive linearisation.
@@ -184,32 +191,35 @@ impl Problem<'_> {
             Terminal::Soft { .. } => None,
         };
         let grid = SearchGrid::new(self.course, merge, step_e, bounds, self.start_e, end);
+        let coarse = grid.n();
+        let range = |k: usize| SearchGrid::node(n, coarse, k)..SearchGrid::node(n, coarse, k + 1);
+        let may_roll: Vec<bool> = match self.may_roll.as_slice() {
+            [] => Vec::new(),
+            may => (0..coarse).map(|k| may[range(k)].iter().all(|m| *m)).collect(),
+        };
         let prices = SearchPrices {
             beta_g_s,
             shift_fuel_g: self.tuning.shift_fuel_g,
             accel_penalty_g_s3_m2: self.tuning.accel_penalty_g_s3_m2,
             brake_m_s2: self.course.brake_m_s2,
             free_cut: true,
+            may_roll: &may_roll,
         };
-        let start = match self.start_gear {
-            Some(Drive::Gear(g)) => Some(g),
-            _ => None,
-        };
-        let path = search(self.truck, tables, &grid, &prices, start)?;
-        let coarse = grid.n();
+        let path = search(self.truck, tables, &grid, &prices, self.start_gear)?;
         let (mut e, mut gears) = (Vec::with_capacity(n + 1), Vec::with_capacity(n));
         for k in 0..coarse {
-            let (a, b) = (SearchGrid::node(n, coarse, k), SearchGrid::node(n, coarse, k + 1));
+            let Range { start: a, end: b } = range(k);
             for i in a..b {
                 let f = (i - a) as f64 / (b - a) as f64;
                 e.push(path.e_j_kg[k] + f * (path.e_j_kg[k + 1] - path.e_j_kg[k]));
-                gears.push(Drive::Gear(path.gears[k]));
+                gears.push(path.gears[k]);
             }
         }
         e.push(path.e_j_kg[coarse]);
         for (k, value) in e.iter_mut().enumerate() {
             *value = value.min(self.e_max[k]).max(self.e_min[k]);
         }
+        eco_roll::close_short(&mut gears, eco_roll::shortest(self.course, self.tuning));
         Some((e, gears))
     }
 }
@@ -237,7 +247,9 @@ pub fn iterate(
         let targets: Vec<f64> =
             now.e_j_kg.iter().zip(&problem.e_min).map(|(e, low)| e.max(*low)).collect();
         let driven = drive_profile(truck, course, &targets, &now.gears, &[], 0.0).e_j_kg;
-        sub.linearise(truck, course, tuning, &driven, &now.gears, beta, problem.cut);
+        let (gears, cut) = (&now.gears, problem.cut);
+        let point = Linearisation { e_j_kg: &driven, gears, beta_g_s: beta, cut };
+        sub.linearise(truck, course, tuning, &point);
         sub.force_cut(&problem.forced_cut);
         bounds(problem, &driven, &now.gears, &mut sub);
         let mut found = solve(&sub, problem.terminal, problem.time, problem.fence_s.as_deref());
@@ -315,7 +327,7 @@ fn hold_minimum(problem: &Problem<'_>, now: &mut Profile) {
 #[must_use]
 pub(crate) fn refined_gears(problem: &Problem<'_>, profile: &Profile) -> Vec<Drive> {
     let reach = libm::round(2.0 * SEARCH_INTERVAL_M / problem.course.h_m) as usize;
-    choose_gears(
+    let mut gears = choose_gears(
         problem.truck,
         problem.course,
         &profile.e_j_kg,
@@ -324,20 +336,25 @@ pub(crate) fn refined_gears(problem: &Problem<'_>, profile: &Profile) -> Vec<Dri
             worth: Some((&profile.worth, &profile.limited)),
             start: problem.start_gear,
             allowed: Some(&nearby_gears(&profile.gears, reach)),
+            may_roll: &problem.may_roll,
         },
-    )
+    );
+    eco_roll::close_short(&mut gears, eco_roll::shortest(problem.course, problem.tuning));
+    gears
 }
 
 /// Bit set of gears used within `reach` intervals, per interval.
-fn nearby_gears(gears: &[Drive], reach: usize) -> Vec<u32> {
-    let bit = |d: &Drive| if let Drive::Gear(g) = d { 1u32 << (g & 31) } else { 0 };
+fn nearby_gears(gears: &[Drive], reach: usize) -> Vec<u64> {
     (0..gears.len())
         .map(|k| {
             let range = k.saturating_sub(reach)..(k + reach + 1).min(gears.len());
-            gears[range].iter().map(bit).fold(0, |a, b| a | b)
+            gears[range].iter().map(|d| gear_bit(*d)).fold(0, |a, b| a | b)
         })
         .collect()
 }
+
+/// Part of the lowest energy by which a rolling truck may have missed it and still be asked for it.
+const ROLLING_BELOW: f64 = 4e-3;
 
 /// Energy bounds of a subproblem: the problem's, widened to the driven profile so that there is a
 /// feasible point, and once gears are frozen the speed ranges of the gears.
@@ -347,7 +364,15 @@ fn bounds(problem: &Problem<'_>, driven: &[f64], gears: &[Drive], sub: &mut Subp
         *low = bound.min(e * (1.0 - 1e-4));
     }
     for (k, &drive) in gears.iter().enumerate() {
-        let Drive::Gear(g) = drive else { continue };
+        let Drive::Gear(g) = drive else {
+            // Rolling cannot be helped by traction: a bound that gave way to what was driven would
+            // give way again in every iteration. Who is only just below it comes faster.
+            let bound = problem.e_min[k + 1];
+            if driven[k + 1] > bound * (1.0 - ROLLING_BELOW) {
+                sub.e_min[k + 1] = bound;
+            }
+            continue;
+        };
         let (low, high) = problem.truck.speed_range_m_s(g as usize);
         for node in [k, k + 1] {
             let here = driven[node];

@@ -37,6 +37,9 @@ pub struct TripRequest<'a> {
 /// a tube around the best so far.
 const TUBE_ROUNDS: usize = 2;
 
+/// The same with an open driveline.
+const ROLL_ROUNDS: usize = 3;
+
 /// Most subproblems that only tell the price of time, which the gear search is asked again with.
 const PROBES: usize = 2;
 
@@ -65,6 +68,8 @@ pub struct Trip {
     pub overspeed: Driven,
     /// Fastest possible trip, s.
     pub fastest_s: f64,
+    /// Intervals in which the driveline may be open, if it may be at all.
+    pub may_roll: Vec<bool>,
     tables: EngineTables,
     eco_roll: bool,
     set_m_s: f64,
@@ -110,6 +115,7 @@ impl Trip {
             .collect();
         let tables = EngineTables::new(&truck, e_max.iter().copied().fold(0.0, f64::max));
         Ok(Self {
+            may_roll: eco_roll::may_roll(&truck, &course, &e_max, &cruise.e_j_kg),
             truck,
             tables,
             course,
@@ -140,6 +146,7 @@ impl Trip {
             start_gear: None,
             cut: CutModel::Hull,
             forced_cut: Vec::new(),
+            may_roll: Vec::new(),
         }
     }
 
@@ -193,70 +200,134 @@ impl Trip {
         solver: &mut Solver<'_>,
     ) -> (Driven, Profile) {
         let mut problem = self.problem(trip_time_s, end_e);
-        let cruise = (self.cruise.e_j_kg.as_slice(), self.cruise.drive.as_slice());
-        let mut best: Option<(f64, Driven, Profile)> = None;
+        let mut best = Best { trip: self, trip_time_s, kept: None };
+        let guess = self.first_guess(&problem, near, solver);
+        self.settle_gears(&problem, guess, &mut best, solver);
+        self.settle_part_load(&mut problem, &mut best, solver);
+        if self.eco_roll {
+            self.open_driveline(&mut problem, &mut best, solver);
+        }
+        match best.kept {
+            Some(kept) => (self.or_cruise(kept.driven, trip_time_s, end_e), kept.profile),
+            None => (self.cruise.clone(), Profile::failed(self.cruising())),
+        }
+    }
+
+    /// Energies and gears of the set-speed cruise control.
+    fn cruising(&self) -> (&[f64], &[Drive]) {
+        (&self.cruise.e_j_kg, &self.cruise.drive)
+    }
+
+    /// A profile with gears from a search over the whole band, and a price of time that fits it.
+    fn first_guess(
+        &self,
+        problem: &Problem<'_>,
+        near: Option<&Profile>,
+        solver: &mut Solver<'_>,
+    ) -> Guess {
         let probe = Iterations { most: 1, ..Iterations::TRIP };
-        let mut beta = self.beta_guess();
+        let searched = |beta| problem.first_profile(&self.tables, beta, 1.0, self.cruising());
+        let mut beta = near.map_or_else(|| self.beta_guess(), |plan| plan.beta_g_s);
         let (mut e, mut gears) = match near {
-            Some(plan) => {
-                beta = plan.beta_g_s;
-                (plan.e_j_kg.clone(), plan.gears.clone())
-            }
-            None => problem.first_profile(&self.tables, beta, 1.0, cruise),
+            Some(plan) => (plan.e_j_kg.clone(), plan.gears.clone()),
+            None => searched(beta),
         };
         for _ in 0..PROBES {
-            let first = iterate(&problem, &e, &gears, beta, probe, solver);
+            let first = iterate(problem, &e, &gears, beta, probe, solver);
             let settled = (first.beta_g_s - beta).abs() < 0.1 * beta;
             beta = first.beta_g_s;
             if settled {
                 break;
             }
-            (e, gears) = problem.first_profile(&self.tables, beta, 1.0, cruise);
+            (e, gears) = searched(beta);
         }
+        Guess { e_j_kg: e, gears, beta_g_s: beta }
+    }
+
+    /// Solves, refines the places of the shifts, and searches the gears anew around the best so far
+    /// at the course's own step.
+    fn settle_gears(
+        &self,
+        problem: &Problem<'_>,
+        mut guess: Guess,
+        best: &mut Best<'_>,
+        solver: &mut Solver<'_>,
+    ) {
         for round in 0..TUBE_ROUNDS {
-            let profile = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
-            beta = profile.beta_g_s;
-            let refined = refined_gears(&problem, &profile);
-            let centre = profile.e_j_kg.clone();
+            let Guess { e_j_kg, gears, beta_g_s } = &guess;
+            let profile = iterate(problem, e_j_kg, gears, *beta_g_s, Iterations::TRIP, solver);
+            let refined = refined_gears(problem, &profile);
+            let (centre, beta) = (profile.e_j_kg.clone(), profile.beta_g_s);
             let other = (refined != profile.gears)
-                .then(|| iterate(&problem, &centre, &refined, beta, Iterations::TRIP, solver));
-            self.keep_better(&problem, trip_time_s, profile, &mut best);
+                .then(|| iterate(problem, &centre, &refined, beta, Iterations::TRIP, solver));
+            best.offer(problem, profile);
             if let Some(other) = other {
-                self.keep_better(&problem, trip_time_s, other, &mut best);
+                best.offer(problem, other);
             }
-            // Around the best so far the gears are searched anew, at the course's own step.
-            let Some((_, driven, kept)) = best.as_ref().filter(|_| round + 1 < TUBE_ROUNDS) else {
+            if round + 1 == TUBE_ROUNDS {
                 break;
-            };
-            let found = problem.tube_profile(&self.tables, kept.beta_g_s, &driven.e_j_kg);
-            let Some(found) = found.filter(|(_, g)| *g != kept.gears) else { break };
-            beta = kept.beta_g_s;
-            (e, gears) = found;
-        }
-        // Part load below zero wheel force: either charged as it is, or cut where it is least.
-        problem.cut = CutModel::Charged;
-        for _ in 0..2 {
-            let Some((_, driven, kept)) = &best else { break };
-            if matches!(problem.cut, CutModel::Hull) {
-                problem.forced_cut = self.light_load(driven);
             }
-            let (e, gears, beta) = (kept.e_j_kg.clone(), kept.gears.clone(), kept.beta_g_s);
-            let other = iterate(&problem, &e, &gears, beta, Iterations::TRIP, solver);
-            self.keep_better(&problem, trip_time_s, other, &mut best);
-            problem.cut = CutModel::Hull;
+            let Some(again) = best.searched_around(problem) else { break };
+            guess = again;
         }
+    }
+
+    /// Part load below zero wheel force: either charged as it is, or cut where it is least.
+    fn settle_part_load(
+        &self,
+        problem: &mut Problem<'_>,
+        best: &mut Best<'_>,
+        solver: &mut Solver<'_>,
+    ) {
+        for cut in [CutModel::Charged, CutModel::Hull] {
+            let Some(kept) = &best.kept else { break };
+            problem.cut = cut;
+            if cut == CutModel::Hull {
+                problem.forced_cut = self.light_load(&kept.driven);
+            }
+            let Profile { e_j_kg, gears, beta_g_s, .. } = &kept.profile;
+            let other = iterate(problem, e_j_kg, gears, *beta_g_s, Iterations::TRIP, solver);
+            best.offer(problem, other);
+        }
+        problem.cut = CutModel::Hull;
         problem.forced_cut.clear();
-        let rolling = best.as_ref().filter(|_| self.eco_roll).and_then(|(_, driven, kept)| {
-            eco_roll::opened(&problem, kept, driven, Iterations::TRIP, solver)
-        });
-        if let Some(other) = rolling {
-            self.keep_better(&problem, trip_time_s, other, &mut best);
+    }
+
+    /// The same searches with the open driveline as one more gear.
+    fn open_driveline(
+        &self,
+        problem: &mut Problem<'_>,
+        best: &mut Best<'_>,
+        solver: &mut Solver<'_>,
+    ) {
+        let Some(kept) = &best.kept else { return };
+        problem.may_roll.clone_from(&self.may_roll);
+        let mut beta = kept.profile.beta_g_s;
+        let (mut e, mut gears) = problem.first_profile(&self.tables, beta, 1.0, self.cruising());
+        for round in 0..ROLL_ROUNDS {
+            let mut solve = |e: &[f64], gears: &[Drive], beta| {
+                eco_roll::rolled(problem, e, gears, beta, Iterations::ROLLING_TRIP, solver)
+            };
+            if let Some(profile) = solve(&e, &gears, beta) {
+                let refined = refined_gears(problem, &profile);
+                let other = (refined != profile.gears)
+                    .then(|| solve(&profile.e_j_kg, &refined, profile.beta_g_s))
+                    .flatten();
+                best.offer(problem, profile);
+                if let Some(other) = other {
+                    best.offer(problem, other);
+                }
+            }
+            if round + 1 == ROLL_ROUNDS {
+                break;
+            }
+            let Some(again) = best.searched_around(problem) else { break };
+            (e, gears, beta) = (again.e_j_kg, again.gears, again.beta_g_s);
         }
-        let Some((_, driven, profile)) = best else {
-            return (self.cruise.clone(), Profile::failed(cruise));
-        };
-        // Cruise control is a plan too: where nothing can be gained (a flat road) it is driven.
-        let mut driven = driven;
+    }
+
+    /// Cruise control is a plan too: where nothing can be gained (a flat road) it is driven.
+    fn or_cruise(&self, mut driven: Driven, trip_time_s: f64, end_e: f64) -> Driven {
         for other in [&self.cruise, &self.overspeed] {
             if other.trip_time_s() <= trip_time_s * (1.0 + 1e-9)
                 && other.e_j_kg[other.e_j_kg.len() - 1] >= end_e - 1e-9
@@ -266,7 +337,7 @@ impl Trip {
                 driven = other.clone();
             }
         }
-        (driven, profile)
+        driven
     }
 
     /// Intervals that inject less than half of what the engine's own drag takes.
@@ -280,42 +351,6 @@ impl Trip {
                 Drive::Neutral => false,
             })
             .collect()
-    }
-
-    /// Drives a profile and keeps it if it costs less than the best so far: fuel, and the price of
-    /// time for what it is late or lies below the minimum speed, tenfold so that such a plan wins
-    /// only where there is no other.
-    fn keep_better(
-        &self,
-        problem: &Problem<'_>,
-        trip_time_s: f64,
-        profile: Profile,
-        best: &mut Option<(f64, Driven, Profile)>,
-    ) {
-        if !matches!(profile.status, SolveStatus::Solved | SolveStatus::AlmostSolved) {
-            return;
-        }
-        let driven = drive_profile(
-            problem.truck,
-            problem.course,
-            &profile.e_j_kg,
-            &profile.gears,
-            &profile.cut,
-            problem.tuning.shift_fuel_g,
-        );
-        let price = profile.beta_g_s.max(self.beta_guess());
-        let late = (driven.trip_time_s() - trip_time_s * (1.0 + 1e-5)).max(0.0);
-        let slow: f64 = driven
-            .e_j_kg
-            .iter()
-            .zip(&self.e_min)
-            .filter(|(e, low)| **e < **low * (1.0 - 1e-3))
-            .map(|(e, low)| self.course.h_m / libm::sqrt(2.0 * e) * (1.0 - libm::sqrt(e / low)))
-            .sum();
-        let cost = driven.total_fuel_g() + 10.0 * price * (late + slow);
-        if best.as_ref().is_none_or(|(least, ..)| cost < *least) {
-            *best = Some((cost, driven, profile));
-        }
     }
 
     /// Largest violation of the speed ceiling (m/s), full load or planned brakes (m/s²). The
@@ -335,5 +370,67 @@ impl Trip {
             worst = worst.max(d.brake_m_s2[k] - self.course.brake_m_s2);
         }
         worst
+    }
+}
+
+/// What an iteration starts from.
+struct Guess {
+    e_j_kg: Vec<f64>,
+    gears: Vec<Drive>,
+    beta_g_s: f64,
+}
+
+/// A plan with what it costs.
+struct Kept {
+    cost_g: f64,
+    driven: Driven,
+    profile: Profile,
+}
+
+/// The best plan so far.
+struct Best<'a> {
+    trip: &'a Trip,
+    trip_time_s: f64,
+    kept: Option<Kept>,
+}
+
+impl Best<'_> {
+    /// Drives a profile and keeps it if it costs less than the best so far: fuel, and the price of
+    /// time for what it is late or lies below the minimum speed, tenfold so that such a plan wins
+    /// only where there is no other.
+    fn offer(&mut self, problem: &Problem<'_>, profile: Profile) {
+        if !matches!(profile.status, SolveStatus::Solved | SolveStatus::AlmostSolved) {
+            return;
+        }
+        let driven = drive_profile(
+            problem.truck,
+            problem.course,
+            &profile.e_j_kg,
+            &profile.gears,
+            &profile.cut,
+            problem.tuning.shift_fuel_g,
+        );
+        let price = profile.beta_g_s.max(self.trip.beta_guess());
+        let late = (driven.trip_time_s() - self.trip_time_s * (1.0 + 1e-5)).max(0.0);
+        let h_m = problem.course.h_m;
+        let slow: f64 = driven
+            .e_j_kg
+            .iter()
+            .zip(&self.trip.e_min)
+            .filter(|(e, low)| **e < **low * (1.0 - 1e-3))
+            .map(|(e, low)| h_m / libm::sqrt(2.0 * e) * (1.0 - libm::sqrt(e / low)))
+            .sum();
+        let cost_g = driven.total_fuel_g() + 10.0 * price * (late + slow);
+        if self.kept.as_ref().is_none_or(|kept| cost_g < kept.cost_g) {
+            self.kept = Some(Kept { cost_g, driven, profile });
+        }
+    }
+
+    /// Energies and gears from a search in a tube around the best, if its gears are other ones.
+    fn searched_around(&self, problem: &Problem<'_>) -> Option<Guess> {
+        let Kept { driven, profile, .. } = self.kept.as_ref()?;
+        let beta_g_s = profile.beta_g_s;
+        let (e_j_kg, gears) = problem.tube_profile(&self.trip.tables, beta_g_s, &driven.e_j_kg)?;
+        (gears != profile.gears).then_some(Guess { e_j_kg, gears, beta_g_s })
     }
 }

@@ -1,8 +1,10 @@
-//! Roads of the corpus: synthetic ones by formula, the built-in ones from the road crate.
+//! Roads of the corpus: synthetic ones by formula, the built-in ones from the road crate; and roads
+//! that nobody has tuned to, drawn from a seed.
 
 use planner::pcc::model::profile_of;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use road::ProfilePoint;
-use tractrix_core::{Curve, FuelModel, Grid, LowLoadFuel, RPM_PER_RAD_S};
 
 /// Length of the synthetic roads, m.
 pub(crate) const LENGTH_M: f64 = 15_000.0;
@@ -90,23 +92,38 @@ pub(crate) fn roads() -> Vec<(&'static str, Vec<ProfilePoint>)> {
     ]
 }
 
-/// Fuel map of another engine as a test bench tells it: flow over speed and torque. Losses grow
-/// toward both ends of the speed range and with the load, so that the best point lies at middle
-/// speed and three quarters of full load; flow at a given speed is convex in torque. Its friction is
-/// that of the reference truck.
-#[allow(dead_code, clippy::expect_used)]
-pub(crate) fn bench_map() -> FuelModel {
-    let rad_s: Vec<f64> = (0..13).map(|i| (600.0 + 125.0 * f64::from(i)) / RPM_PER_RAD_S).collect();
-    let torque_nm: Vec<f64> = (0..110).map(|i| 24.0 * f64::from(i)).collect();
-    let flow = |w: f64, t: f64| {
-        let lost = 120.0 + 0.09 * w * RPM_PER_RAD_S + 100.0 * (w / 120.0 - 1.0).powi(2);
-        0.0485e-3 * w * (t + lost + 60.0 * (t / 1300.0).powi(2))
-    };
-    let g_s = rad_s.iter().flat_map(|&w| torque_nm.iter().map(move |&t| flow(w, t))).collect();
-    let friction_nm = rad_s.iter().map(|w| 95.0 + 0.085 * w * RPM_PER_RAD_S).collect();
-    FuelModel::Map {
-        flow_g_s: Grid::new("flow", rad_s.clone(), torque_nm, g_s).expect("increasing axes"),
-        friction_nm: Curve::new("friction", rad_s, friction_nm).expect("an increasing axis"),
-        low_load: LowLoadFuel::default(),
-    }
+/// Roads that only report: waves of random length and phase (300 m to 6 km, long ones higher) with a
+/// grade of 0.8 to 3 % standard deviation, clipped at 6 %, and on every other road a stretch with a
+/// lower limit.
+pub(crate) fn unseen() -> Vec<(String, Vec<ProfilePoint>)> {
+    (0..6_u64)
+        .map(|seed| {
+            let mut rng = ChaCha8Rng::seed_from_u64(0x70AD + seed);
+            let parts: Vec<(f64, f64, f64)> = (0..12)
+                .map(|_| {
+                    let wave_m = 300.0 * 20.0_f64.powf(rng.random_range(0.0..1.0));
+                    let phase = rng.random_range(0.0..core::f64::consts::TAU);
+                    (wave_m, phase, wave_m.sqrt())
+                })
+                .collect();
+            let norm = (parts.iter().map(|(_, _, a)| 0.5 * a * a).sum::<f64>()).sqrt();
+            let std_frac = rng.random_range(0.008..0.03);
+            let slow_from_m = rng.random_range(5_000.0..10_000.0);
+            let mut profile = by_grade(|s| {
+                let wave = |(wave_m, phase, a): &(f64, f64, f64)| {
+                    a * libm::sin(core::f64::consts::TAU * s / wave_m + phase)
+                };
+                let sum: f64 = parts.iter().map(wave).sum();
+                (std_frac * sum / norm).clamp(-0.06, 0.06)
+            });
+            if seed % 2 == 1 {
+                for p in &mut profile {
+                    if (slow_from_m..slow_from_m + 800.0).contains(&p.s_m) {
+                        p.speed_limit_m_s = 60.0 / 3.6;
+                    }
+                }
+            }
+            (format!("unseen{seed}, {:.1} %", 100.0 * std_frac), profile)
+        })
+        .collect()
 }

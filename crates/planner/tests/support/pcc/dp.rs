@@ -10,6 +10,10 @@
 //! edges at every step, refined between the candidates. A second, finer grid follows in a tube
 //! around that trip. The price of time is adjusted until the trip lasts as long as asked.
 //!
+//! With [`Task::may_roll`] the driveline may be opened (neutral, engine idling) where a road falls;
+//! nowhere else, because on a flat road accelerating and rolling by turns would be cheapest, which no
+//! plan should ask for, and never where the truck would have to be braked (it has no engine brake).
+//!
 //! `beta` is the price of time in g/s; every other quantity is SI.
 
 use tractrix_core::{FuelModel, GRAVITY_M_S2, PowertrainLimits, VehicleLimits};
@@ -42,7 +46,12 @@ pub(crate) struct Task<'a> {
     /// Whether the objective charges the flow at vanishing torque at fuel cut-off too. A map that
     /// jumps there otherwise makes full power and cut-off by turns optimal on a flat road.
     pub(crate) charge_cut: bool,
+    /// Intervals in which the driveline may be open; `None`: in no interval.
+    pub(crate) may_roll: Option<Vec<bool>>,
 }
+
+/// Index of the open driveline among the gears.
+pub(crate) const NEUTRAL: usize = usize::MAX;
 
 /// Grid sizes.
 #[derive(Clone, Copy)]
@@ -128,6 +137,7 @@ pub(crate) struct Plant<'a> {
     air: f64,
     slowest_w: f64,
     aux_w: f64,
+    idle_g_s: f64,
 }
 
 fn figures(p: &PowertrainLimits, mass: f64, i: f64, eta: f64, v: f64) -> At {
@@ -145,13 +155,22 @@ impl<'a> Plant<'a> {
         let top = task.e_max.iter().copied().fold(0.0, f64::max);
         let bottom = task.e_min.iter().copied().fold(f64::MAX, f64::min);
         let slowest_w = LUGGING * p.idle_speed_rad_s;
+        let rows = (top / TABLE_STEP) as usize + 3;
+        let rolling = task.may_roll.is_some().then(|| Gear {
+            index: NEUTRAL,
+            i: 0.0,
+            eta: 1.0,
+            mu: 1.0 + p.rotating_mass_neutral_kg / mass,
+            from_e: 0.0,
+            to_e: f64::INFINITY,
+            at: vec![At::default(); rows],
+        });
         let gears = (0..p.gear_ratios.len())
             .map(|g| {
                 let i = p.gear_ratios[g] * p.final_drive_ratio / p.wheel_radius_m;
                 let eta = p.gear_efficiency_frac[g];
                 let from = if g == 0 { 0.0 } else { slowest_w / i };
                 let to = p.max_speed_rad_s / i;
-                let rows = (top / TABLE_STEP) as usize + 3;
                 let at = (0..rows)
                     .map(|r| figures(p, mass, i, eta, (2.0 * r as f64 * TABLE_STEP).sqrt()))
                     .collect();
@@ -159,6 +178,7 @@ impl<'a> Plant<'a> {
                 Gear { index: g, i, eta, mu, from_e: 0.5 * from * from, to_e: 0.5 * to * to, at }
             })
             .filter(|gear| gear.from_e < top && gear.to_e > bottom)
+            .chain(rolling)
             .collect();
         Self {
             task,
@@ -168,6 +188,7 @@ impl<'a> Plant<'a> {
             air: task.limits.road_load.air_density_kg_m3 * task.limits.road_load.cd_a_m2 / mass,
             slowest_w,
             aux_w: p.auxiliary_power_w,
+            idle_g_s: p.idle_fuel_g_s,
         }
     }
 
@@ -184,6 +205,11 @@ impl<'a> Plant<'a> {
         let accel = (e1 - e0) / h;
         let need = gear.mu * accel + at.drag + self.resistance(k, mean);
         let time_s = 2.0 * h / ((2.0 * e0).sqrt() + (2.0 * e1).sqrt());
+        let accel_g = time_s * self.task.accel_g * accel * accel;
+        if gear.index == NEUTRAL {
+            let fuel_g = self.idle_g_s * time_s;
+            return Edge { fuel_g, charged_g: fuel_g, time_s, accel_g, need, full: 0.0 };
+        }
         let w = ((2.0 * mean).sqrt() * gear.i).max(self.slowest_w);
         let pull = (need - at.drag) * self.mass;
         let net = if pull >= 0.0 { pull / (gear.i * gear.eta) } else { pull * gear.eta / gear.i };
@@ -195,7 +221,6 @@ impl<'a> Plant<'a> {
             0.0
         };
         let fuel_g = if injects { charged_g } else { 0.0 };
-        let accel_g = time_s * self.task.accel_g * accel * accel;
         Edge { fuel_g, charged_g, time_s, accel_g, need, full: at.full }
     }
 
@@ -286,6 +311,10 @@ impl<'a> Sweep<'a> {
         let plant = self.plant;
         let ceiling = plant.task.e_max[k + 1];
         let coast = plant.reach(k, slot, e0, 0.0);
+        if plant.gears[slot].index == NEUTRAL {
+            let may = plant.task.may_roll.as_ref().is_some_and(|may| may[k]) && coast <= ceiling;
+            return may.then(|| (coast, self.total(k, slot, e0, coast)));
+        }
         let low = coast.min(ceiling);
         let strongest = plant.task.brake_m_s2 * plant.task.h_m / plant.gears[slot].mu;
         if coast - low > strongest || !plant.drives(slot, 0.5 * (e0 + low)) {

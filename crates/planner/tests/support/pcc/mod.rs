@@ -1,51 +1,31 @@
 //! What tests, benches and examples of the speed planner share: trucks, roads, requests, the
 //! dynamic-programming reference.
-#![allow(dead_code, clippy::unwrap_used)]
+#![allow(dead_code, clippy::unwrap_used, clippy::expect_used)]
 
 pub(crate) mod corpus;
 #[path = "../data_sheet.rs"]
 pub(crate) mod data_sheet;
 pub(crate) mod dp;
+mod engines;
 pub(crate) mod replan;
 
+pub(crate) use engines::Engine;
 use planner::pcc::model::{Drive, Driven};
 use planner::pcc::solve::{DefaultSolver, Solver};
 use planner::pcc::{SpeedBand, Trip, TripRequest, Tuning};
 use road::ProfilePoint;
-use tractrix_core::{FuelModel, LowLoadFuel, VehicleLimits};
+use tractrix_core::VehicleLimits;
 
 /// Speed bands of the corpus around 72 km/h, km/h.
 pub(crate) const BANDS_KM_H: [(f64, f64); 3] = [(65.0, 79.0), (60.0, 85.0), (50.0, 90.0)];
 /// Masses of the corpus, kg.
 pub(crate) const MASSES_KG: [f64; 2] = [19_000.0, 55_000.0];
 
-/// Fuel maps of the corpus.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Engine {
-    /// The reference truck's Willans line, which jumps where injection starts.
-    Willans,
-    /// A Willans line through zero at fuel cut-off.
-    Continuous,
-    /// Another engine's consumption over speed and torque.
-    BenchMap,
-}
-
 /// The data sheet's truck at a mass, with an engine.
 pub(crate) fn truck(mass_kg: f64, engine: Engine) -> VehicleLimits {
     let mut limits = data_sheet::reference_limits();
     limits.road_load.mass_kg = mass_kg;
-    match engine {
-        Engine::Willans => {}
-        Engine::Continuous => {
-            limits.powertrain.fuel = FuelModel::Willans {
-                constant_g_s: 0.0,
-                per_rpm_g_s: 0.0,
-                per_kw_g_s: 0.052,
-                low_load: LowLoadFuel::default(),
-            };
-        }
-        Engine::BenchMap => limits.powertrain.fuel = corpus::bench_map(),
-    }
+    engine.install(&mut limits.powertrain);
     limits
 }
 
@@ -93,7 +73,13 @@ pub(crate) fn task<'a>(trip: &'a Trip, limits: &'a VehicleLimits) -> dp::Task<'a
         accel_g: trip.tuning.accel_penalty_g_s3_m2,
         brake_m_s2: trip.course.brake_m_s2,
         charge_cut: true,
+        may_roll: None,
     }
+}
+
+/// Where the reference may open the driveline: on every descent.
+pub(crate) fn descents(trip: &Trip) -> Vec<bool> {
+    trip.course.sin.iter().map(|sin| *sin < 0.0).collect()
 }
 
 /// Fuel, time and largest violation of a plan by the reference's own truck.
@@ -110,11 +96,15 @@ pub(crate) fn audited(task: &dp::Task<'_>, driven: &Driven) -> Audit {
     let v = |e: f64| (2.0 * e).sqrt();
     let mut audit = Audit { fuel_g: 0.0, time_s: 0.0, violation: 0.0f64 };
     for k in 0..driven.drive.len() {
-        let Drive::Gear(gear) = driven.drive[k] else {
-            panic!("no plan here may open the driveline")
+        let gear = match driven.drive[k] {
+            Drive::Gear(gear) => gear as usize,
+            Drive::Neutral => dp::NEUTRAL,
         };
         let (e0, e1) = (driven.e_j_kg[k], driven.e_j_kg[k + 1]);
-        let edge = plant.exact_edge(k, gear as usize, e0, e1).unwrap();
+        let edge = plant.exact_edge(k, gear, e0, e1).expect("a gear that may be driven");
+        if gear == dp::NEUTRAL {
+            audit.violation = audit.violation.max(-edge.need);
+        }
         if k > 0 && driven.drive[k] != driven.drive[k - 1] {
             audit.fuel_g += task.shift_g;
         }

@@ -74,6 +74,7 @@ impl Window {
             start_gear: None,
             cut: CutModel::Hull,
             forced_cut: Vec::new(),
+            may_roll: Vec::new(),
         };
         let iterations = Iterations { most: SUBPROBLEMS, rest_m_s: 0.0 };
         iterate(&problem, &self.e, &self.gears, self.beta_g_s, iterations, solver)
