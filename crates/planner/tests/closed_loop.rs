@@ -87,7 +87,8 @@ fn stack_and_speed_planner_refuse_the_same_limits_in_the_same_words() {
         speed_limit_m_s: 25.0,
         ..road::ProfilePoint::default()
     });
-    let spoils: [(&str, fn(&mut VehicleLimits)); 9] = [
+    type Spoil = fn(&mut VehicleLimits);
+    let spoils: [(&str, Spoil); 9] = [
         ("road_load.mass_kg = 300000", |l| l.road_load.mass_kg = 3e5),
         ("road_load.rolling_coeff = 0.15", |l| l.road_load.rolling_coeff = 0.15),
         ("powertrain.wheel_radius_m = 2.5", |l| l.powertrain.wheel_radius_m = 2.5),
