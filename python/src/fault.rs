@@ -63,11 +63,12 @@ impl Fault {
 
 impl From<Fault> for PyErr {
     fn from(fault: Fault) -> Self {
+        let short = |text: String| tractrix_core::words::with_short_numbers(&text);
         match fault {
-            Fault::Value(text) => PyValueError::new_err(text),
+            Fault::Value(text) => PyValueError::new_err(short(text)),
             Fault::NotFound(text) => PyFileNotFoundError::new_err(text),
             Fault::Io(text) => PyOSError::new_err(text),
-            Fault::Work(text) => PyRuntimeError::new_err(text),
+            Fault::Work(text) => PyRuntimeError::new_err(short(text)),
         }
     }
 }

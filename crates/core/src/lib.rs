@@ -24,6 +24,8 @@ mod scene;
 mod seams;
 mod table;
 mod time;
+#[cfg(feature = "std")]
+pub mod words;
 
 pub use command::{BrakeMode, Command, GearRequest};
 pub use ego::{EgoState, PowertrainSignals, TrailerState};

@@ -118,9 +118,8 @@ impl Cause {
     ) -> Result<Overlay, DynamicsError> {
         let mut set = BTreeMap::new();
         for (p, e) in self.parameters().zip(estimates) {
-            let nominal = truck.parameter(p.path).ok_or_else(|| {
-                DynamicsError::UnknownParameter { name: name.into(), path: p.path.into() }
-            })?;
+            let nominal =
+                truck.parameter(p.path).ok_or_else(|| truck.unknown_parameter(name, p.path))?;
             let value = OverlayValue {
                 value: p.value(nominal, e.size),
                 sigma: Some(p.slope(nominal).abs() * e.sigma),

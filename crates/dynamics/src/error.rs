@@ -47,11 +47,13 @@ pub enum DynamicsError {
         value: f64,
     },
     /// An overlay names a parameter that does not exist.
-    #[error("overlay {name}: no parameter {path:?}")]
+    #[error("overlay {name}: no parameter {path:?}; the nearest are {nearest}")]
     UnknownParameter {
         /// Name of the overlay.
         name: String,
         /// Dotted path.
         path: String,
+        /// The paths that are most like it.
+        nearest: String,
     },
 }

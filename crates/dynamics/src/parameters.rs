@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use tractrix_core::words::{deserializer_message, nearest};
 
 use crate::DynamicsError;
 use crate::bounds::Bounds;
@@ -178,8 +179,8 @@ impl TruckParameters {
         let mut truck = self.clone();
         for (path, new) in &overlay.set {
             truck = truck.with_parameter(path, new.value).map_err(|e| match e {
-                DynamicsError::UnknownParameter { path, .. } => {
-                    DynamicsError::UnknownParameter { name: overlay.name.clone(), path }
+                DynamicsError::UnknownParameter { path, nearest, .. } => {
+                    DynamicsError::UnknownParameter { name: overlay.name.clone(), path, nearest }
                 }
                 other => other,
             })?;
@@ -194,11 +195,20 @@ impl TruckParameters {
     /// # Errors
     /// [`DynamicsError::UnknownParameter`] if the path names no number.
     pub fn with_parameter(&self, path: &str, value: f64) -> Result<Self, DynamicsError> {
-        let unknown =
-            || DynamicsError::UnknownParameter { name: self.name.clone(), path: path.into() };
+        let unknown = || self.unknown_parameter(&self.name, path);
         let mut root = toml::Value::try_from(self).map_err(|_| unknown())?;
         *number_at(&mut root, path).ok_or_else(unknown)? = toml::Value::Float(value);
         root.try_into().map_err(|_| unknown())
+    }
+
+    /// The error of a path that names no number, with the nearest that do.
+    pub(crate) fn unknown_parameter(&self, name: &str, path: &str) -> DynamicsError {
+        let mut paths = Vec::new();
+        if let Ok(root) = toml::Value::try_from(self) {
+            number_paths(&root, String::new(), &mut paths);
+        }
+        let nearest = nearest(path, paths.iter().map(String::as_str)).join(", ");
+        DynamicsError::UnknownParameter { name: name.into(), path: path.into(), nearest }
     }
 
     /// One number by dotted path.
@@ -257,6 +267,25 @@ fn number_at<'a>(root: &'a mut toml::Value, path: &str) -> Option<&'a mut toml::
     (at.is_float() || at.is_integer()).then_some(at)
 }
 
+/// The dotted paths of all numbers of a TOML value.
+fn number_paths(at: &toml::Value, path: String, out: &mut Vec<String>) {
+    match at {
+        toml::Value::Float(_) | toml::Value::Integer(_) => out.push(path),
+        toml::Value::Table(table) => {
+            let dot = if path.is_empty() { "" } else { "." };
+            for (key, value) in table {
+                number_paths(value, format!("{path}{dot}{key}"), out);
+            }
+        }
+        toml::Value::Array(list) => {
+            for (i, value) in list.iter().enumerate() {
+                number_paths(value, format!("{path}[{i}]"), out);
+            }
+        }
+        _ => {}
+    }
+}
+
 fn parse(name: &str, text: &str, e: &toml::de::Error) -> DynamicsError {
     let place = e.span().map_or(String::new(), |span| {
         let end = span.start.min(text.len());
@@ -264,6 +293,6 @@ fn parse(name: &str, text: &str, e: &toml::de::Error) -> DynamicsError {
     });
     DynamicsError::Parse {
         name: name.into(),
-        why: format!("{place}{}", e.message().replace('\n', " ")),
+        why: format!("{place}{}", deserializer_message(e.message())),
     }
 }

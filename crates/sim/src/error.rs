@@ -23,12 +23,12 @@ pub enum SimError {
         why: String,
     },
     /// No such built-in scenario.
-    #[error("no built-in scenario {name:?}; there are {known}")]
+    #[error("no built-in scenario {name:?}; the nearest are {nearest}")]
     UnknownScenario {
         /// The name asked for.
         name: String,
-        /// The names that exist.
-        known: String,
+        /// The names that are most like it.
+        nearest: String,
     },
     /// A change to a scenario that cannot be made.
     #[error("{option} {value}: {why}")]

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use planner::decider::DeciderKind;
 use serde::{Deserialize, Serialize};
+use tractrix_core::words::{deserializer_message, nearest};
 
 use crate::{SimError, TrafficSection};
 
@@ -141,12 +142,12 @@ impl Scenario {
     /// The text of a built-in scenario.
     ///
     /// # Errors
-    /// [`SimError::UnknownScenario`] lists the names that exist.
+    /// [`SimError::UnknownScenario`] with the nearest names.
     pub fn builtin_text(name: &str) -> Result<&'static str, SimError> {
         BUILTIN.iter().find(|(n, _)| *n == name).map(|(_, text)| *text).ok_or_else(|| {
             SimError::UnknownScenario {
                 name: name.to_owned(),
-                known: Self::names().collect::<Vec<_>>().join(", "),
+                nearest: nearest(name, Self::names()).join(", "),
             }
         })
     }
@@ -196,7 +197,7 @@ impl Scenario {
                 let end = text.len().min(span.start);
                 format!("line {}: ", text[..end].matches('\n').count() + 1)
             });
-            bad(format!("{place}{}", e.message().replace('\n', " ")))
+            bad(format!("{place}{}", deserializer_message(e.message())))
         })?;
         scenario.checked().map_err(bad)?;
         Ok(scenario)

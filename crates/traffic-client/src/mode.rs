@@ -98,8 +98,9 @@ impl Manifest {
     /// # Errors
     /// [`TrafficError::Manifest`] names the key, or an unknown schema.
     pub fn from_toml(text: &str) -> Result<Self, TrafficError> {
-        let manifest: Self =
-            toml::from_str(text).map_err(|e| TrafficError::Manifest { why: e.to_string() })?;
+        let manifest: Self = toml::from_str(text).map_err(|e| TrafficError::Manifest {
+            why: tractrix_core::words::deserializer_message(e.message()),
+        })?;
         if manifest.schema == 1 {
             Ok(manifest)
         } else {
