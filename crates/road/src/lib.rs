@@ -22,6 +22,8 @@ mod shape;
 mod small;
 #[cfg(feature = "std")]
 mod smooth;
+#[cfg(feature = "std")]
+pub mod xml;
 
 pub use bake::BAKE_TOLERANCE_M;
 pub use cubics::Cubics;

@@ -3,18 +3,16 @@
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::Node;
 
 use super::count::counts;
 use super::model::{Connection, Contact, Header, Junction, Link, Network, RoadRecord};
 use super::read_lanes;
 use super::xml::{Source, child, children};
 use crate::bake::Baker;
+use crate::xml::{self, MAX_BYTES};
 use crate::{Cubics, GeoReference, Line, Placed, RoadError, RoadObject, Shape};
 
-/// Larger files are refused, bytes.
-const MAX_BYTES: u64 = 128 << 20;
-const MAX_XML_NODES: u32 = 20_000_000;
 /// A longer road is taken for a mistake, m.
 const MAX_ROAD_M: f64 = 1e6;
 /// A longer map is taken for a mistake, m.
@@ -43,16 +41,12 @@ impl Network {
     /// # Errors
     /// As [`Network::load`].
     pub fn parse(name: &str, text: &str) -> Result<Self, RoadError> {
-        let options = ParsingOptions { nodes_limit: MAX_XML_NODES, ..ParsingOptions::default() };
         let text = without_late_declaration(text.trim_start_matches('\u{feff}'));
-        let doc = Document::parse_with_options(&text, options).map_err(|e| {
-            let why = e.to_string();
-            RoadError::OpenDrive {
-                path: name.into(),
-                line: e.pos().row,
-                element: "xml".into(),
-                why,
-            }
+        let doc = xml::parse(&text).map_err(|e| RoadError::OpenDrive {
+            path: name.into(),
+            line: e.line,
+            element: "xml".into(),
+            why: e.why,
         })?;
         let (source, root) = (Source::new(name, &text), doc.root_element());
         if root.tag_name().name() != "OpenDRIVE" {

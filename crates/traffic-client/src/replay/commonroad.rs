@@ -10,7 +10,7 @@ use super::recording::Row;
 /// [`ReplayError::Format`] names the line of what is missing or not a number.
 pub fn read_commonroad(name: &str, text: &str) -> Result<Vec<Row>, ReplayError> {
     let bad = |why: String| ReplayError::Format { name: name.to_owned(), why };
-    let document = roxmltree::Document::parse(text).map_err(|e| bad(e.to_string()))?;
+    let document = road::xml::parse(text).map_err(|e| bad(e.to_string()))?;
     let root = document.root_element();
     if !root.has_tag_name("commonRoad") {
         return Err(bad(format!("root element is <{}>, not <commonRoad>", root.tag_name().name())));
@@ -25,11 +25,12 @@ pub fn read_commonroad(name: &str, text: &str) -> Result<Vec<Row>, ReplayError> 
         n.has_tag_name("dynamicObstacle")
             || (n.has_tag_name("obstacle") && text_at(*n, &["role"]) == Some("dynamic"))
     }) {
-        let line = document.text_pos_at(obstacle.range().start).row;
+        // Counting lines takes as long as the text before them.
+        let line = |node: roxmltree::Node<'_, '_>| document.text_pos_at(node.range().start).row;
         let id = obstacle
             .attribute("id")
             .and_then(|x| x.parse().ok())
-            .ok_or_else(|| bad(format!("line {line}: obstacle without a number")))?;
+            .ok_or_else(|| bad(format!("line {}: obstacle without a number", line(obstacle))))?;
         let number = |path: &[&str]| text_at(obstacle, path).and_then(|x| x.parse::<f64>().ok());
         let head = Row {
             id,
@@ -44,13 +45,13 @@ pub fn read_commonroad(name: &str, text: &str) -> Result<Vec<Row>, ReplayError> 
             .filter(|n| n.has_tag_name("trajectory"))
             .flat_map(|n| n.children().filter(|n| n.has_tag_name("state")));
         for state in first.chain(later) {
-            let line = document.text_pos_at(state.range().start).row;
             let value = |path: &[&str]| {
                 text_at(state, path).and_then(|x| x.parse::<f64>().ok()).filter(|x| x.is_finite())
             };
             let need = |path: &[&str]| {
-                value(path)
-                    .ok_or_else(|| bad(format!("line {line}: no number in {}", path.join("/"))))
+                let missing =
+                    || bad(format!("line {}: no number in {}", line(state), path.join("/")));
+                value(path).ok_or_else(missing)
             };
             rows.push(Row {
                 time_s: step_s * need(&["time", "exact"])?,

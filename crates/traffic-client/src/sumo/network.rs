@@ -112,7 +112,7 @@ pub(crate) fn file_error(path: &Path, e: &std::io::Error) -> SumoError {
 /// [`SumoError::Map`] names what is missing.
 pub fn read(text: &str, file: &Path) -> Result<Network, SumoError> {
     let bad = |why: String| SumoError::Map { why };
-    let document = roxmltree::Document::parse(text).map_err(|e| bad(e.to_string()))?;
+    let document = road::xml::parse(text).map_err(|e| bad(e.to_string()))?;
     let mut network = Network { file: file.to_owned(), lanes: Vec::new(), next: BTreeMap::new() };
     for node in document.root_element().children() {
         match node.tag_name().name() {
