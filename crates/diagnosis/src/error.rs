@@ -41,6 +41,21 @@ pub enum DiagnosisError {
         /// Why it cannot be used.
         why: String,
     },
+    /// The time column is not in seconds.
+    #[error(
+        "{}: column time_s {what}, taken as seconds; if it is in {suspected}, divide it by {divisor:.0}",
+        path.display()
+    )]
+    NotSeconds {
+        /// The file.
+        path: PathBuf,
+        /// What no log of a drive shows, with the value.
+        what: String,
+        /// The unit that it looks like.
+        suspected: &'static str,
+        /// How many of that unit are a second.
+        divisor: f64,
+    },
     /// The time column runs backwards.
     #[error(
         "drive {drive}: time_s runs backwards at row {row} ({before_s} s, then {after_s} s): rows are shuffled"

@@ -128,6 +128,14 @@ impl Outcome {
             std::fs::write(&path, text)
                 .map_err(|e| DiagnosisError::Io { path, why: e.to_string() })?;
         }
+        self.check_truck(folder)
+    }
+
+    /// Loads the extended truck from the folder that its files were written into.
+    ///
+    /// # Errors
+    /// [`DiagnosisError::Truck`] if it does not load.
+    pub fn check_truck(&self, folder: &Path) -> Result<(), DiagnosisError> {
         if let Some(file) = &self.found.extended_truck {
             TruckParameters::load(&folder.join(file).display().to_string())
                 .map_err(|e| DiagnosisError::Truck(e.to_string()))?;

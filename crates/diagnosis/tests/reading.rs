@@ -150,3 +150,57 @@ fn drives_come_in_the_order_of_the_index_however_they_are_read() {
     let error = read_drives_with(dir.path(), &Backwards).unwrap_err().to_string();
     assert!(error.contains("second.csv"), "{error}");
 }
+
+/// Times in milliseconds were laid on a grid of seconds: 6.6 GB and minutes for an hour's drive.
+#[test]
+fn times_that_are_not_seconds_are_refused_with_the_file_and_what_they_look_like() {
+    let refusal = |per_second: f64, step_s: f64| {
+        let rows = (0..7200).map(|i| {
+            let t = f64::from(i) * step_s;
+            (t * per_second, speed(t), "0.4".to_owned())
+        });
+        read_drives(folder(rows).path()).unwrap_err().to_string()
+    };
+    for (per_second, step_s, unit) in [
+        (1e3, 0.05, "milliseconds"),
+        (1e3, 1.0, "milliseconds"),
+        (1e6, 0.05, "microseconds"),
+        (1e9, 0.05, "nanoseconds"),
+    ] {
+        let line = refusal(per_second, step_s);
+        for part in ["d.csv", "time_s steps by", "taken as seconds", unit] {
+            assert!(line.contains(part), "{part}: {line}");
+        }
+    }
+    let line = refusal(1.0, 20.0);
+    assert!(line.contains("steps by 20 "), "{line}");
+    // at 1 kHz the step says nothing, the length does: 7200 h
+    let dir = folder((0..100_000).map(|i| (f64::from(i), 20.0, "0.4".to_owned())));
+    let line = read_drives(dir.path()).unwrap_err().to_string();
+    assert!(line.contains("spans 99999") && line.contains("milliseconds"), "{line}");
+}
+
+#[test]
+fn a_parquet_file_that_is_compressed_otherwise_says_with_what() {
+    let gzip = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/gzip.parquet");
+    let line = diagnosis::read_table(&gzip).unwrap_err().to_string();
+    assert!(line.contains("gzip.parquet: column time_s is compressed with GZIP"), "{line}");
+
+    let dir = tempfile::tempdir().unwrap();
+    let whole = dir.path().join("d.parquet");
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    std::io::Write::write_all(&mut packed, &std::fs::read(gzip).unwrap()).unwrap();
+    std::fs::write(&whole, packed.finish().unwrap()).unwrap();
+    let line = diagnosis::read_table(&whole).unwrap_err().to_string();
+    assert!(line.contains("compressed with gzip; unpack it"), "{line}");
+}
+
+#[test]
+fn an_unknown_key_of_the_index_comes_with_its_line_and_the_nearest() {
+    let dir = folder(std::iter::empty());
+    let text = "schema = 1\ntruck = \"reference\"\n[[drive]]\nname = \"d\"\nfile = \"d.csv\"\nmass_kg = 3.0\n";
+    write(dir.path(), "drives.toml", text);
+    let line = read_drives(dir.path()).unwrap_err().to_string();
+    assert!(line.contains("line 6: unknown key \"mass_kg\""), "{line}");
+    assert!(line.contains("reported_mass_kg"), "{line}");
+}

@@ -1,6 +1,6 @@
 //! The command line: commands, options, and errors on one line.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::cmd;
 use crate::failure::{Failure, one_line};
@@ -37,6 +37,29 @@ pub(crate) enum Command {
     /// Lists and shows the built-in scenarios.
     #[command(subcommand)]
     Scenario(cmd::scenario::Command),
+}
+
+impl Cli {
+    /// Reads the command line.
+    ///
+    /// # Errors
+    /// Wrong usage, or a wish for help or the version.
+    pub(crate) fn read(
+        arguments: impl IntoIterator<Item = std::ffi::OsString>,
+    ) -> Result<Self, clap::Error> {
+        let matches = values_may_be_negative(Self::command()).try_get_matches_from(arguments)?;
+        Self::from_arg_matches(&matches)
+    }
+}
+
+/// A negative number after an option is its value, not an unknown flag: the message names both.
+fn values_may_be_negative(command: clap::Command) -> clap::Command {
+    command
+        .mut_args(|arg| {
+            let takes_value = arg.get_action().takes_values();
+            if takes_value { arg.allow_negative_numbers(true) } else { arg }
+        })
+        .mut_subcommands(values_may_be_negative)
 }
 
 /// Wrong usage as one line: what is wrong, without the help that follows it.
@@ -78,9 +101,21 @@ mod tests {
 
     #[test]
     fn wrong_usage_is_one_line_that_names_the_flag() {
-        let error = Cli::try_parse_from(["sim-server", "run", "--sede", "3"]).unwrap_err();
-        let line = usage_failure(&error).line();
+        let refusal = |words: &[&str]| {
+            let words = ["sim-server"].iter().chain(words).map(std::ffi::OsString::from);
+            usage_failure(&Cli::read(words).unwrap_err()).line()
+        };
+        let line = refusal(&["run", "--sede", "3"]);
         assert!(line.contains("--sede") && !line.contains("Usage"), "{line}");
+        for (words, flag) in [
+            (&["run", "--duration", "-1"][..], "--duration"),
+            (&["run", "--duration", "-1e3"], "--duration"),
+            (&["run", "--seed", "-1"], "--seed"),
+            (&["traffic", "--out", "x", "--lanes", "-2"], "--lanes"),
+        ] {
+            let line = refusal(words);
+            assert!(line.contains(flag) && line.contains(words.last().unwrap()), "{line}");
+        }
     }
 
     #[test]

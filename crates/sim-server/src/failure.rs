@@ -1,5 +1,6 @@
 //! How a command ends when it does not succeed.
 
+use std::error::Error;
 use std::path::Path;
 
 /// Why a command failed. The message is one line that names the key, file or value.
@@ -34,12 +35,38 @@ impl Failure {
         Self::Work(error.to_string())
     }
 
-    /// Failed work on a file, with all causes of the error.
-    pub(crate) fn work_on(path: &Path, error: &dyn std::error::Error) -> Self {
-        Self::Work(format!("{}: {}", path.display(), with_causes(error)))
+    /// A file or folder cannot be written: a full disk is failed work, a place where nothing can be
+    /// written is bad input.
+    pub(crate) fn writing(path: &Path, error: &(dyn Error + 'static)) -> Self {
+        use std::io::ErrorKind as K;
+        let (at, why) = (path.display(), with_causes(error));
+        match io_kind(error) {
+            Some(K::StorageFull | K::QuotaExceeded | K::FileTooLarge | K::WriteZero) => {
+                Self::Work(format!("{at}: the disk is full ({why})"))
+            }
+            Some(
+                K::AlreadyExists
+                | K::InvalidFilename
+                | K::IsADirectory
+                | K::NotADirectory
+                | K::NotFound
+                | K::PermissionDenied
+                | K::ReadOnlyFilesystem,
+            ) => Self::Input(format!("{at}: {why}")),
+            _ => Self::Work(format!("{at}: {why}")),
+        }
     }
 
-    /// A file that the user named cannot be read or written.
+    /// The same failure with what helps.
+    #[must_use]
+    pub(crate) fn hint(self, what: &str) -> Self {
+        match self {
+            Self::Input(why) => Self::Input(format!("{why}; {what}")),
+            Self::Work(why) => Self::Work(format!("{why}; {what}")),
+        }
+    }
+
+    /// A file that the user named cannot be read.
     pub(crate) fn file(path: &Path, error: impl std::fmt::Display) -> Self {
         Self::Input(format!("{}: {error}", path.display()))
     }
@@ -59,7 +86,7 @@ impl Failure {
 
     /// The message on one line.
     pub(crate) fn line(&self) -> String {
-        one_line(&self.to_string())
+        tractrix_core::words::with_short_numbers(&one_line(&self.to_string()))
     }
 }
 
@@ -69,13 +96,45 @@ pub(crate) fn one_line(text: &str) -> String {
 }
 
 /// An error's message and those of its causes.
-fn with_causes(error: &dyn std::error::Error) -> String {
+fn with_causes(error: &(dyn Error + 'static)) -> String {
     let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(inner) = cause {
-        text.push_str(": ");
-        text.push_str(&inner.to_string());
-        cause = inner.source();
+    for cause in causes(error).skip(1).map(ToString::to_string) {
+        if !text.ends_with(&cause) {
+            text.push_str(": ");
+            text.push_str(&cause);
+        }
     }
     text
+}
+
+/// What the operating system said, wherever in the chain of causes.
+fn io_kind(error: &(dyn Error + 'static)) -> Option<std::io::ErrorKind> {
+    causes(error).find_map(|e| e.downcast_ref::<std::io::Error>()).map(std::io::Error::kind)
+}
+
+/// An error and its causes.
+fn causes<'a>(error: &'a (dyn Error + 'static)) -> impl Iterator<Item = &'a (dyn Error + 'static)> {
+    std::iter::successors(Some(error), |&e| e.source())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io;
+
+    #[test]
+    fn a_full_disk_is_failed_work_and_a_wrong_place_is_bad_input() {
+        let write = |kind: io::ErrorKind| {
+            let wrapped = mcap::McapError::Io(io::Error::from(kind));
+            Failure::writing(Path::new("out/run.mcap"), &wrapped)
+        };
+        for full in [io::ErrorKind::StorageFull, io::ErrorKind::FileTooLarge] {
+            let failure = write(full);
+            assert_eq!(failure.exit_code(), 1);
+            let line = failure.hint("`sim-server recover`").line();
+            assert!(line.starts_with("out/run.mcap: the disk is full (") && line.ends_with("ver`"));
+        }
+        assert_eq!(write(io::ErrorKind::PermissionDenied).exit_code(), 2);
+        assert_eq!(write(io::ErrorKind::BrokenPipe).exit_code(), 1);
+    }
 }

@@ -10,19 +10,20 @@ mod dashboard;
 mod driver;
 mod failure;
 mod lane_lines;
+mod out_folder;
 mod output;
 mod picture;
 mod progress;
 mod provenance;
 mod recording;
+mod signals;
 
 use std::process::ExitCode;
 
-use clap::Parser;
 use clap::error::ErrorKind;
 
 fn main() -> ExitCode {
-    let result = match cli::Cli::try_parse() {
+    let result = match cli::Cli::read(std::env::args_os()) {
         Ok(cli) => cmd::dispatch(cli),
         Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             return if e.print().is_ok() { ExitCode::SUCCESS } else { ExitCode::from(1) };

@@ -1,21 +1,31 @@
 //! What the program prints: the only module that writes to stdout and stderr.
 
-use std::io::Write;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+
+use crate::failure::Failure;
 
 /// One line of what went wrong, on stderr.
-#[expect(clippy::disallowed_macros, reason = "the shell prints")]
 pub(crate) fn error_line(line: &str) {
-    eprintln!("error: {line}");
+    note(&format!("error: {line}"));
 }
 
-/// One line for a human, on stderr; stdout is for results.
-#[expect(clippy::disallowed_macros, reason = "the shell prints")]
+/// One line for a human, on stderr; stdout is for results. A terminal that is gone does not matter.
 pub(crate) fn note(line: &str) {
-    eprintln!("{line}");
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
 /// The result of a command, on stdout. A closed pipe is the reader's choice, not a failure.
-pub(crate) fn result(text: &str) {
+///
+/// # Errors
+/// [`Failure::Work`] when stdout goes into a file on a full disk.
+pub(crate) fn result(text: &str) -> Result<(), Failure> {
     let mut stdout = std::io::stdout().lock();
-    let _ = writeln!(stdout, "{}", text.trim_end());
+    let written = writeln!(stdout, "{}", text.trim_end()).and_then(|()| stdout.flush());
+    match written {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::writing(Path::new("standard output"), &e))
+        }
+        _ => Ok(()),
+    }
 }

@@ -21,6 +21,8 @@ fn numbers_that_are_no_numbers_are_refused_with_their_flag() {
         let flag_value = format!("{flag}={value}");
         let line = refused(&["run", "--headless", &flag_value]);
         assert!(line.contains(flag) && line.contains(value), "{line}");
+        let line = refused(&["run", "--headless", flag, value]);
+        assert!(line.contains(flag) && line.contains(value), "{line}");
     }
     assert!(refused(&["run", "--headless", "--port", "99999"]).contains("99999"));
 }
@@ -48,7 +50,7 @@ fn a_wrong_key_in_a_scenario_is_named_with_its_file() {
     let folder = tempfile::tempdir().unwrap();
     for (text, named) in [
         ("speed_limit_kmh = 80\n", "speed_limit_kmh"),
-        ("[ego]\nspeed_km_h = 72.0\n", "speed_km_h"),
+        ("[ego]\nspeed_km_h = 72.0\n", "unknown key \"speed_km_h\"; the nearest are speed_m_s, "),
         ("[ego]\nspeed_m_s = nan\n", "ego.speed_m_s"),
         ("[run]\ntick_s = 0.0\n", "run.tick_s"),
         ("[stack]\ndecider = \"psychic\"\n", "psychic"),
@@ -60,12 +62,26 @@ fn a_wrong_key_in_a_scenario_is_named_with_its_file() {
     }
 }
 
+/// A number of 1e308 was written with all of its 309 digits.
+#[test]
+fn a_number_is_never_longer_than_it_has_digits() {
+    let folder = tempfile::tempdir().unwrap();
+    let digits = format!("{}", 1e308);
+    let line = refused(&["run", "--headless", "--payload-kg", &digits]);
+    assert!(line.contains("1e308") && line.len() < 300, "{line}");
+    let file = scenario_with(folder.path(), &format!("[ego]\nspeed_m_s = {digits}.0\n"));
+    let line = refused(&["run", "--headless", &file]);
+    assert!(line.contains("ego.speed_m_s") && line.contains("1e308"), "{line}");
+    assert!(line.len() < 300, "{line}");
+}
+
 #[test]
 fn missing_and_malformed_files_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name).display().to_string();
     assert!(refused(&["run", &path("none.toml")]).contains("none.toml"));
-    assert!(refused(&["run", "no-such-scenario"]).contains("highway"), "lists what there is");
+    let line = refused(&["run", "higway"]);
+    assert!(line.contains("the nearest are highway, "), "{line}");
     assert!(refused(&["run", "--headless", "--truck", "no-such-truck"]).contains("no-such-truck"));
     assert!(refused(&["recover", &path("none.mcap")]).contains("none.mcap"));
     assert!(refused(&["scenario", "show", "nowhere"]).contains("nowhere"));

@@ -139,7 +139,7 @@ fn a_recording_is_reproduced_in_open_loop_and_the_accuracy_is_defined() {
     assert!(speed(serde_json::json!(60.0)) > 0.97, "{fidelity}");
     assert!(speed(serde_json::Value::Null) > 0.9, "{fidelity}");
     assert!(folder.path().join("out/replay.html").is_file());
-    let missing = text(&folder.path().join("none"));
+    let (missing, out) = (text(&folder.path().join("none")), text(&folder.path().join("other")));
     let refused = refused(&["replay", "--truck", "reference", "--drives", &missing, "--out", &out]);
     assert!(refused.contains("none"), "{refused}");
 }
@@ -159,6 +159,7 @@ fn an_experiment_is_suggested_for_what_a_diagnosis_leaves_open() {
     assert_eq!(found["plan"][0]["manoeuvre"], "hot_brakes", "{found}");
     assert!(folder.path().join("out/experiment.json").is_file());
 
+    let out = text(&folder.path().join("other"));
     let wrong = ["experiment", "suggest", "--truck", "reference", "--causes", "flux"];
     assert!(refused(&[&wrong[..], &["--out", &out]].concat()).contains("flux"));
     std::fs::write(&diagnosis, "{}").unwrap();

@@ -6,7 +6,7 @@ mod support;
 
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
@@ -108,26 +108,34 @@ fn without_a_folder_each_run_gets_a_new_one_under_runs() {
     }
 }
 
-#[test]
+/// Starts a run, waits until the recording has this many bytes, and returns the process.
 #[expect(clippy::disallowed_methods, reason = "the test waits for another process")]
-fn ctrl_c_and_sigterm_finish_the_recording_and_the_summary() {
-    for signal in ["INT", "TERM"] {
-        let folder = tempfile::tempdir().unwrap();
-        let mut run = program()
-            .args(["run", "--headless", "--pace", "20", "--out"])
-            .arg(folder.path())
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap();
-        let recording = folder.path().join("run.mcap");
-        for _ in 0..600 {
-            if recording.metadata().is_ok_and(|m| m.len() > 100_000) {
-                break;
-            }
-            std::thread::sleep(Duration::from_millis(50));
+fn under_way(command: &mut Command, recording: &Path, bytes: u64) -> Child {
+    let mut run = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    for _ in 0..1200 {
+        if recording.metadata().is_ok_and(|m| m.len() > bytes) || run.try_wait().unwrap().is_some()
+        {
+            break;
         }
-        let kill = ["-s", signal, &run.id().to_string()].map(str::to_owned);
-        assert!(std::process::Command::new("kill").args(kill).status().unwrap().success());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    run
+}
+
+fn signal(process: &Child, name: &str) {
+    let kill = ["-s", name, &process.id().to_string()].map(str::to_owned);
+    assert!(Command::new("kill").args(kill).status().unwrap().success());
+}
+
+/// A hangup (the terminal is closed) killed the run and left a torn recording.
+#[test]
+fn ctrl_c_sigterm_and_a_hangup_finish_the_recording_and_the_summary() {
+    for name in ["INT", "TERM", "HUP"] {
+        let folder = tempfile::tempdir().unwrap();
+        let recording = folder.path().join("run.mcap");
+        let arguments = ["run", "--headless", "--pace", "20", "--out"];
+        let mut run = under_way(program().args(arguments).arg(folder.path()), &recording, 100_000);
+        signal(&run, name);
         assert_eq!(run.wait().unwrap().code(), Some(0));
         let summary = json(&folder.path().join("summary.json"));
         assert_eq!(summary["end_reason"], "interrupted");
@@ -140,19 +148,40 @@ fn ctrl_c_and_sigterm_finish_the_recording_and_the_summary() {
     }
 }
 
+/// With `--keep-open` the first SIGTERM ended the run only, and the server waited for another.
 #[test]
-fn a_disk_that_fills_up_ends_the_run_with_a_clear_error() {
-    if !Path::new("/dev/full").exists() {
-        return;
-    }
+fn one_sigterm_ends_a_server_that_is_kept_open() {
     let folder = tempfile::tempdir().unwrap();
-    std::os::unix::fs::symlink("/dev/full", folder.path().join("run.mcap")).unwrap();
-    let out = folder.path().display().to_string();
-    let output = server(&["run", "--headless", "--duration", "60", "--out", &out]);
-    let line = String::from_utf8(output.stderr).unwrap();
-    assert_ne!(output.status.code(), Some(0));
-    assert!(line.contains("run.mcap") && line.contains("No space left"), "{line}");
-    assert_eq!(line.lines().count(), 1, "{line}");
+    let (recording, summary) = (folder.path().join("run.mcap"), folder.path().join("summary.json"));
+    let serve = |more: &[&str], wait_for: &Path, bytes| {
+        let fixed = ["run", "flat", "--port", "0", "--keep-open", "--overwrite", "--out"];
+        let command = &mut program();
+        under_way(command.args(fixed).arg(folder.path()).args(more), wait_for, bytes)
+    };
+    let mut under_way = serve(&[], &recording, 10_000);
+    signal(&under_way, "TERM");
+    assert_eq!(under_way.wait().unwrap().code(), Some(0));
+    assert_eq!(json(&summary)["end_reason"], "interrupted");
+
+    fs::remove_file(&summary).unwrap();
+    let mut ended = serve(&["--duration", "1", "--pace", "max"], &summary, 100);
+    signal(&ended, "TERM");
+    assert_eq!(ended.wait().unwrap().code(), Some(0));
+    assert_eq!(json(&summary)["end_reason"], "time_over");
+}
+
+/// `nohup` starts a program with hangups ignored: they do not end the run.
+#[test]
+fn a_run_under_nohup_goes_on_after_a_hangup() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = folder.path().join("run.mcap");
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_sim-server")]);
+    shell.args(["run", "flat", "--headless", "--pace", "10", "--duration", "30", "--out"]);
+    let mut run = under_way(shell.arg(folder.path()), &recording, 20_000);
+    signal(&run, "HUP");
+    assert_eq!(run.wait().unwrap().code(), Some(0));
+    assert_eq!(json(&folder.path().join("summary.json"))["end_reason"], "time_over");
 }
 
 #[test]

@@ -9,9 +9,11 @@
 mod support;
 
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use serde_json::Value;
-use support::{refused, server};
+use support::{program, refused, server};
 
 fn shared(path: &str) -> Option<String> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(path);
@@ -140,6 +142,34 @@ fn a_calibration_brings_the_speeds_nearer_and_is_a_scenario_that_drives_again() 
         &["--scenario", &again, "--compare", &file, "--duration", "60"],
     );
     assert_eq!(ks(&again), ks(&s), "the file holds all that was found");
+}
+
+/// `traffic --duration 1e9` grew until memory was full, and Ctrl-C threw away what it had seen.
+#[test]
+#[expect(clippy::disallowed_methods, reason = "the test waits for another process")]
+fn ctrl_c_writes_what_there_is_and_a_duration_is_bounded() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let line = refused(&["traffic", "--duration", "1e9", "--out", out.to_str().unwrap()]);
+    assert!(line.contains("--duration") && line.contains("86400"), "{line}");
+
+    let options = ["traffic", "--scenario", "medium-15", "--duration", "86400", "--out"];
+    // Before there is anything to write, the program just ends; nobody knows how long that is.
+    for seconds in [3, 10, 30] {
+        let mut traffic = program().args(options).arg(&out).stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(Duration::from_secs(seconds));
+        let id = traffic.id().to_string();
+        assert!(Command::new("kill").args(["-s", "TERM", &id]).status().unwrap().success());
+        if traffic.wait().unwrap().code() == Some(0) {
+            break;
+        }
+        assert!(!out.exists());
+    }
+    let written = std::fs::read_to_string(out.join("statistics.json")).unwrap();
+    let statistics: Value = serde_json::from_str(&written).unwrap();
+    assert_eq!(statistics["end_reason"], "interrupted");
+    assert!(number(&statistics, &["simulated", "duration_s"]) > 0.0);
+    assert!(out.join("trajectories.parquet").exists());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use road::{Road, builtin};
 use tractrix_core::{EgoState, Scene, Time, TrafficSource, VehicleClass};
 use traffic_client::replay::{
     Carriageway, Frame, Recording, ReplayConfig, ReplayTraffic, Row, load, read_parquet, road_of,
-    write_parquet,
+    to_parquet,
 };
 
 fn shared(path: &str) -> Option<PathBuf> {
@@ -103,7 +103,7 @@ fn a_recording_survives_parquet() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.parquet");
     let recording = two_cars();
-    write_parquet(&path, &recording).unwrap();
+    std::fs::write(&path, to_parquet(&recording).unwrap()).unwrap();
     let rows = read_parquet(&path).unwrap();
     assert_eq!(rows.len(), 402);
     let again = load(&path, Carriageway::Forward, 0.1).unwrap();

@@ -1,5 +1,9 @@
 //! From a raw table to channels on the uniform grid, with every defect noted.
 
+use std::path::Path;
+
+use tractrix_core::words::Short;
+
 use crate::drive::Drive;
 use crate::finding::{Action, Finding, FindingKind};
 use crate::{Channel, DiagnosisError};
@@ -8,6 +12,10 @@ use super::RawTable;
 
 /// Shortest drive that is read, s.
 const MIN_DRIVE_S: f64 = 60.0;
+/// Longest drive that is read, s: a day.
+const LONGEST_DRIVE_S: f64 = 86_400.0;
+/// No log of a truck is as slow as this, s from row to row.
+const SLOWEST_STEP_S: f64 = 5.0;
 /// Part of a channel that may be missing or implausible and is interpolated over.
 const MAX_BAD_FRAC: f64 = 0.02;
 /// A channel that must move and does not for this long while the truck drives is stuck, s.
@@ -15,6 +23,7 @@ const STUCK_S: f64 = 30.0;
 
 pub(super) fn to_grid(
     name: &str,
+    path: &Path,
     table: &RawTable,
     findings: &mut Vec<Finding>,
 ) -> Result<Drive, DiagnosisError> {
@@ -43,11 +52,10 @@ pub(super) fn to_grid(
             needed_s: MIN_DRIVE_S,
         });
     }
+    let typical_s = typical_step(&t);
+    in_seconds(path, typical_s, seconds)?;
     let len = (seconds / Drive::STEP_S + 1e-6).floor() as usize + 1;
-    if len > 50_000_000 {
-        return Err(column("time_s", "spans more than four weeks: not seconds"));
-    }
-    note_gaps(&t, &mut note);
+    note_gaps(&t, typical_s, &mut note);
     let mut drive = Drive::new(name, t[0], len);
     for (label, values) in &table.columns {
         if label == "time_s" {
@@ -115,10 +123,35 @@ fn usable_rows(
     Ok(keep)
 }
 
-fn note_gaps(t: &[f64], note: &mut Note<'_>) {
+/// Median step of the time column; it has two rows at least.
+fn typical_step(t: &[f64]) -> f64 {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
-    let typical = steps[steps.len() / 2];
+    steps[steps.len() / 2]
+}
+
+/// Refuses times that are not seconds, before they are laid on a grid of seconds.
+fn in_seconds(path: &Path, typical_s: f64, seconds: f64) -> Result<(), DiagnosisError> {
+    let what = if typical_s >= SLOWEST_STEP_S {
+        format!("steps by {} from row to row", Short(typical_s))
+    } else if seconds > LONGEST_DRIVE_S {
+        format!(
+            "spans {} ({:.1} days, a drive is a day at most)",
+            Short(seconds),
+            seconds / LONGEST_DRIVE_S
+        )
+    } else {
+        return Ok(());
+    };
+    // The largest unit with which steps and length are those of a drive.
+    let fits =
+        |divisor: f64| typical_s / divisor < SLOWEST_STEP_S && seconds / divisor < LONGEST_DRIVE_S;
+    let units = [("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9)];
+    let (suspected, divisor) = units.into_iter().find(|u| fits(u.1)).unwrap_or(units[2]);
+    Err(DiagnosisError::NotSeconds { path: path.to_owned(), what, suspected, divisor })
+}
+
+fn note_gaps(t: &[f64], typical: f64, note: &mut Note<'_>) {
     for w in t.windows(2) {
         let seconds = w[1] - w[0];
         if seconds > 10.0 * typical {

@@ -7,6 +7,7 @@ mod parquet_table;
 use std::path::Path;
 
 use serde::Deserialize;
+use tractrix_core::words::deserializer_message;
 
 use crate::drive::RoadMap;
 use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial, Trace, collect};
@@ -54,7 +55,11 @@ impl Index {
         let text = std::fs::read_to_string(&path)
             .map_err(|e| DiagnosisError::Io { path: path.clone(), why: e.to_string() })?;
         let bad = |why: String| DiagnosisError::Index { path: path.clone(), why };
-        let index: Index = toml::from_str(&text).map_err(|e| bad(e.to_string()))?;
+        let index: Index = toml::from_str(&text).map_err(|e| {
+            let before = e.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let line = before.matches('\n').count() + 1;
+            bad(format!("line {line}: {}", deserializer_message(e.message())))
+        })?;
         if index.schema != 1 {
             return Err(bad(format!("schema = {}, this program reads schema 1", index.schema)));
         }
@@ -164,8 +169,9 @@ fn read_drive(
     bad: &(dyn Fn(String) -> DiagnosisError + Sync),
 ) -> Result<(Drive, Vec<Finding>), DiagnosisError> {
     let mut findings = Vec::new();
-    let table = read_table(&dir.join(&entry.file))?;
-    let mut drive = grid::to_grid(&entry.name, &table, &mut findings)?;
+    let path = dir.join(&entry.file);
+    let table = read_table(&path)?;
+    let mut drive = grid::to_grid(&entry.name, &path, &table, &mut findings)?;
     if let Some(m) = entry.reported_mass_kg {
         if !PLAUSIBLE_MASS_KG.contains(&m) {
             return Err(bad(format!("drive {}: reported_mass_kg = {m}", entry.name)));

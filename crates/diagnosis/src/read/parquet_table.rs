@@ -1,8 +1,9 @@
 //! Parquet tables with flat numeric columns.
 
+use std::io::Read;
 use std::path::Path;
 
-use parquet::basic::Type;
+use parquet::basic::{CompressionCodec as Codec, Type};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::DataType;
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -10,13 +11,21 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use super::RawTable;
 use crate::DiagnosisError;
 
+/// First bytes of a gzip file (RFC 1952).
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+
 pub(super) fn read(path: &Path) -> Result<RawTable, DiagnosisError> {
     let io = |e: std::io::Error| DiagnosisError::Io { path: path.to_owned(), why: e.to_string() };
     let bad = |e: parquet::errors::ParquetError| DiagnosisError::Table {
         path: path.to_owned(),
         why: e.to_string(),
     };
-    let file = std::fs::File::open(path).map_err(io)?;
+    let mut file = std::fs::File::open(path).map_err(io)?;
+    let mut head = [0; 2];
+    if file.read_exact(&mut head).is_ok() && head == GZIP_MAGIC {
+        let why = "the file is compressed with gzip; unpack it first".to_owned();
+        return Err(DiagnosisError::Table { path: path.to_owned(), why });
+    }
     let reader = SerializedFileReader::new(file).map_err(bad)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let mut columns = Vec::new();
@@ -32,6 +41,14 @@ pub(super) fn read(path: &Path) -> Result<RawTable, DiagnosisError> {
         let mut out = Vec::new();
         for g in 0..reader.num_row_groups() {
             let group = reader.get_row_group(g).map_err(bad)?;
+            let codec = group.metadata().column(c).compression_codec();
+            if !matches!(codec, Codec::UNCOMPRESSED | Codec::SNAPPY | Codec::ZSTD) {
+                let why = format!(
+                    "column {} is compressed with {codec:?}; snappy, zstd and none are read",
+                    descr.name()
+                );
+                return Err(DiagnosisError::Table { path: path.to_owned(), why });
+            }
             let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
             let optional = descr.max_def_level();
             let r = match group.get_column_reader(c).map_err(bad)? {

@@ -7,6 +7,7 @@ use diagnosis::{DriveSet, Options, Request, Threads};
 use dynamics::TruckParameters;
 
 use crate::failure::Failure;
+use crate::out_folder::{Out, OutFolder};
 use crate::output;
 use crate::progress::Stages;
 
@@ -48,26 +49,31 @@ pub(crate) struct Args {
     /// Seed of the example, and of the intervals of the gain.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder of the results.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    out: Out,
     /// Prints diagnosis.json on stdout instead of sentences.
     #[arg(long)]
     json: bool,
 }
 
+/// What is written, beside drives that are made.
+const RESULTS: &[&str] =
+    &["diagnosis.json", "report.html", "hidden.json", "*.extended.toml", "*.base.toml"];
+
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let out = args.out.folder(RESULTS)?;
+    let at = out.path();
     let threads = Threads::available();
     let stages = Stages::start();
     let hidden = if args.example {
         stages.show("measuring a simulated truck with a hidden effect");
-        Some(example::measure(&args.out, args.seed, &threads)?)
+        Some(example::measure(&out, args.seed, &threads)?)
     } else {
         None
     };
     let folder = |given: &Option<PathBuf>, made: &str| {
-        if args.example { Some(args.out.join(made)) } else { given.clone() }
+        if args.example { Some(at.join(made)) } else { given.clone() }
     };
     let missing = |what: &str| Failure::Input(format!("{what} is missing"));
     let truck_name = args.truck.as_deref().or(hidden.as_ref().map(|_| example::TRUCK));
@@ -76,9 +82,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let baseline_at = folder(&args.baseline, "baseline");
 
     let truck = TruckParameters::load(truck_name).map_err(Failure::input)?;
-    let drives = read(&drives_at, &truck, &args.out.join("drives"), args.seed)?;
-    let made = args.out.join("baseline");
-    let baseline = baseline_at.as_deref().map(|b| read(b, &truck, &made, args.seed)).transpose()?;
+    let drives = read(&drives_at, &truck, &out, "drives", args.seed)?;
+    let baseline = baseline_at.as_deref();
+    let baseline = baseline.map(|b| read(b, &truck, &out, "baseline", args.seed)).transpose()?;
     let options = Options { hold_out: args.hold_out.clone(), ..Options::default() };
     let request = Request {
         truck: &truck,
@@ -91,8 +97,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         seed: args.seed,
     };
     let outcome = request.run(&threads, &mut |p| stages.show(&stage(p))).map_err(Failure::input)?;
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
-    outcome.write_truck(&args.out).map_err(Failure::input)?;
+    for (name, text) in &outcome.truck_files {
+        out.write(name, text)?;
+    }
+    outcome.check_truck(&at).map_err(Failure::input)?;
     let mut results = Results { outcome, example: None, seed: args.seed };
     if let Some(hidden) = hidden {
         stages.show("running the simulator with the extended truck");
@@ -101,21 +109,22 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         results.example = Some((hidden, closed_loop));
     }
     stages.finish();
-    let text = results.write(&args.out)?;
-    output::result(&if args.json { text } else { results.sentences(&args.out) });
-    Ok(())
+    let text = results.write(&out)?;
+    out.keep();
+    output::result(&if args.json { text } else { results.sentences(&at) })
 }
 
 /// Measured drives: a folder as the contract has it, or recordings of this program, from which
-/// such a folder is made at `made`.
+/// such a folder is made, `made` among the results.
 pub(crate) fn read(
     path: &Path,
     truck: &TruckParameters,
-    made: &Path,
+    out: &OutFolder,
+    made: &str,
     seed: u64,
 ) -> Result<DriveSet, Failure> {
     let folder = if path.join("drives.toml").is_file() {
-        path
+        path.to_owned()
     } else {
         let recordings = recorded::recordings(path);
         if recordings.is_empty() && !path.is_dir() {
@@ -126,15 +135,11 @@ pub(crate) fn read(
         }
         let tables: Result<Vec<_>, _> =
             recordings.iter().map(|r| recorded::table(r, truck, seed)).collect();
-        folder::write(made, &truck.name, &tables?)?;
+        let made = out.begin(made)?;
+        folder::write(&made, &truck.name, &tables?)?;
         made
     };
-    diagnosis::read_drives_with(folder, &Threads::available()).map_err(Failure::input)
-}
-
-/// Writes a file of the results.
-pub(crate) fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::file(path, e))
+    diagnosis::read_drives_with(&folder, &Threads::available()).map_err(Failure::input)
 }
 
 fn stage(p: diagnosis::Progress) -> String {

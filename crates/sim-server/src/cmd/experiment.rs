@@ -9,8 +9,9 @@ use diagnosis::{DriveSet, Threads};
 use dynamics::TruckParameters;
 use serde::{Deserialize, Serialize};
 
-use super::diagnose::{read, write};
+use super::diagnose::read;
 use crate::failure::Failure;
+use crate::out_folder::Out;
 use crate::output;
 use crate::progress::Stages;
 use crate::provenance::Provenance;
@@ -48,9 +49,8 @@ pub(crate) struct Args {
     /// Seed of the logger's noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Folder of the results.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    out: Out,
     /// Prints experiment.json on stdout instead of sentences.
     #[arg(long)]
     json: bool,
@@ -93,6 +93,7 @@ struct Unseen {
 /// Runs the command.
 pub(crate) fn run(command: &Command) -> Result<(), Failure> {
     let Command::Suggest(args) = command;
+    let out = args.out.folder(&["experiment.json"])?;
     let threads = Threads::available();
     let truck = TruckParameters::load(&args.truck).map_err(Failure::input)?;
     let mut causes = args.causes.clone();
@@ -100,7 +101,7 @@ pub(crate) fn run(command: &Command) -> Result<(), Failure> {
         causes.extend(of_diagnosis(file)?);
     }
     let measured = |at: &Option<PathBuf>, made: &str| -> Result<Option<DriveSet>, Failure> {
-        at.as_deref().map(|d| read(d, &truck, &args.out.join(made), args.seed)).transpose()
+        at.as_deref().map(|d| read(d, &truck, &out, made, args.seed)).transpose()
     };
     let drives = measured(&args.drives, "drives")?;
     let baseline = measured(&args.baseline, "baseline")?;
@@ -112,10 +113,9 @@ pub(crate) fn run(command: &Command) -> Result<(), Failure> {
     let provenance = Provenance::of_seed(args.seed);
     let json = serde_json::to_string_pretty(&ExperimentJson { provenance, experiment: &found })
         .map_err(Failure::work)?;
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
-    write(&args.out.join("experiment.json"), &json)?;
-    output::result(&if args.json { json } else { sentences(&found, &args.out) });
-    Ok(())
+    out.write("experiment.json", &json)?;
+    out.keep();
+    output::result(&if args.json { json } else { sentences(&found, &out.path()) })
 }
 
 /// Causes that a diagnosis leaves open.

@@ -52,8 +52,7 @@ pub(crate) fn run(command: Command) -> Result<(), Failure> {
         let report = carriageway::inspect(&args.road, &road);
         (serde_json::to_string(&report), carriageway::text(&report))
     };
-    output::result(if args.json { json.map_err(Failure::work)? } else { text }.as_str());
-    Ok(())
+    output::result(if args.json { json.map_err(Failure::work)? } else { text }.as_str())
 }
 
 fn text(r: &MapReport) -> String {

@@ -1,6 +1,5 @@
 //! `plan`: the fuel-optimal speed profile of a whole trip, against both cruise controls.
 
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Parser;
@@ -15,8 +14,10 @@ use tractrix_core::VehicleLimits;
 
 use crate::cli::positive;
 use crate::failure::Failure;
+use crate::out_folder::Out;
 use crate::output;
 use crate::picture::{Line, Strip, Style, page};
+use crate::progress::Stages;
 use crate::provenance::Provenance;
 
 /// Writes plan.csv, plan.json and a picture of the trip, plan.html.
@@ -46,9 +47,8 @@ pub(crate) struct Args {
     /// Lets coasting phases open the driveline.
     #[arg(long)]
     eco_roll: bool,
-    /// Folder of the results.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    out: Out,
     /// Prints plan.json on stdout instead of a sentence.
     #[arg(long)]
     json: bool,
@@ -115,6 +115,7 @@ const PROFILE_STEP_M: f64 = 10.0;
 
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let out = args.out.folder(&["plan.csv", "plan.json", "plan.html"])?;
     let limits = truck_at_mass(&args.truck, args.mass_kg)?;
     let road = Road::load(&args.road).map_err(Failure::input)?;
     let profile = profile_of(&road, PROFILE_STEP_M);
@@ -133,6 +134,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     #[expect(clippy::disallowed_methods, reason = "the shell owns the clock")]
     let start = Instant::now();
     let since_ms = || start.elapsed().as_secs_f64() * 1e3;
+    let stages = Stages::start();
+    stages.show("planning the trip");
     let trip = Trip::new(&request).map_err(Failure::input)?;
     let mut default = DefaultSolver::default();
     let mut solver =
@@ -141,22 +144,17 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let solve_time_ms = since_ms();
     let result = trip.compared(plan, &mut solver);
     let total_time_ms = since_ms();
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
-
+    stages.finish();
     let report = report(args, &result, [solve_time_ms, total_time_ms]);
     let json = serde_json::to_string_pretty(&report).map_err(Failure::work)?;
     let title = format!("{} on {}, {:.1} t", args.truck, args.road, args.mass_kg * 1e-3);
     let overspeed = trip.rows(&trip.overspeed);
-    write(&args.out.join("plan.csv"), &csv(&result.rows))?;
-    write(&args.out.join("plan.json"), &json)?;
+    out.write("plan.csv", csv(&result.rows))?;
+    out.write("plan.json", &json)?;
     let picture = page(&title, &sentence(&report), "distance, km", &strips(&result, &overspeed));
-    write(&args.out.join("plan.html"), &picture)?;
-    output::result(if args.json { json } else { sentence(&report) }.as_str());
-    Ok(())
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::file(path, e))
+    out.write("plan.html", picture)?;
+    out.keep();
+    output::result(if args.json { json } else { sentence(&report) }.as_str())
 }
 
 /// What a truck says about itself when it weighs this much in all.

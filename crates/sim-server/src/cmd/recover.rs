@@ -32,7 +32,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let recovered = recover(&args.file)?;
     if args.json {
         let report = Report { provenance: Provenance::of_seed(0), recovered };
-        output::result(&serde_json::to_string(&report).map_err(Failure::work)?);
+        output::result(&serde_json::to_string(&report).map_err(Failure::work)?)
     } else {
         output::result(&format!(
             "{}: {} messages on {} channels to {:.3} s, {} attachments, {} metadata records{}",
@@ -43,7 +43,6 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             recovered.attachments,
             recovered.metadata_records,
             if recovered.was_torn { "" } else { "; the file was whole" },
-        ));
+        ))
     }
-    Ok(())
 }

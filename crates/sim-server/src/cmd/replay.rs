@@ -8,8 +8,9 @@ use diagnosis::{Threads, collect, read_traces, whole_run};
 use dynamics::TruckParameters;
 use serde::Serialize;
 
-use super::diagnose::{read, write};
+use super::diagnose::read;
 use crate::failure::Failure;
+use crate::out_folder::Out;
 use crate::output;
 use crate::picture::{Line, Strip, Style, page};
 use crate::progress::Stages;
@@ -30,9 +31,8 @@ pub(crate) struct Args {
     /// the file's name (_18t).
     #[arg(long)]
     whole: bool,
-    /// Folder of the results.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    out: Out,
     /// Prints fidelity.json on stdout instead of sentences.
     #[arg(long)]
     json: bool,
@@ -52,6 +52,7 @@ struct FidelityJson<'a> {
 
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let out = args.out.folder(&["fidelity.json", "replay.html"])?;
     let truck = TruckParameters::load(&args.truck).map_err(Failure::input)?;
     let stages = Stages::start();
     let drives = if args.whole {
@@ -59,7 +60,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         stages.show("replaying the traces");
         collect(&Threads::available(), traces.len(), |i| whole_run(&truck, &traces[i]))
     } else {
-        let set = read(&args.drives, &truck, &args.out.join("drives"), 1)?;
+        let set = read(&args.drives, &truck, &out, "drives", 1)?;
         stages.show("replaying the drives");
         collect(&Threads::available(), set.drives.len(), |i| fidelity(&truck, &set.drives[i]))
     };
@@ -76,8 +77,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         drives: &drives,
     };
     let json = serde_json::to_string_pretty(&json).map_err(Failure::work)?;
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
-    write(&args.out.join("fidelity.json"), &json)?;
+    out.write("fidelity.json", &json)?;
     let title = format!("{} in open loop on measured inputs", truck.name);
     let picture = if args.whole {
         let axis = "time, s (traces one after the other)";
@@ -86,9 +86,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         let axis = "time, min (drives one after the other)";
         page(&title, &text, axis, &strips(&drives, THIN, diagnosis::Drive::STEP_S / 60.0))
     };
-    write(&args.out.join("replay.html"), &picture)?;
-    output::result(if args.json { &json } else { &text });
-    Ok(())
+    out.write("replay.html", picture)?;
+    out.keep();
+    output::result(if args.json { &json } else { &text })
 }
 
 /// The same signal and horizon of all drives together.

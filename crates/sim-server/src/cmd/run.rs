@@ -62,13 +62,16 @@ pub(crate) struct Args {
     /// Folder of run.mcap and summary.json [default: a new one under runs/].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    /// Replaces the run that is in that folder.
+    #[arg(long, requires = "out")]
+    overwrite: bool,
     /// No dashboard.
     #[arg(long)]
     headless: bool,
     /// Port of the dashboard on 127.0.0.1; 0 takes a free one.
     #[arg(long, default_value_t = 8080, value_parser = RangedU64ValueParser::<u16>::new())]
     port: u16,
-    /// Keeps the dashboard open after the end, until Ctrl-C.
+    /// Keeps the dashboard open after the end, until Ctrl-C, SIGTERM or SIGHUP.
     #[arg(long, conflicts_with = "headless")]
     keep_open: bool,
     /// Prints the summary as one JSON object, and nothing else, on stdout.

@@ -26,7 +26,7 @@ pub(crate) enum Command {
 pub(crate) fn run(command: &Command) -> Result<(), Failure> {
     match command {
         Command::Show { name } => {
-            output::result(Scenario::builtin_text(name).map_err(Failure::input)?);
+            output::result(Scenario::builtin_text(name).map_err(Failure::input)?)
         }
         Command::List { json } => {
             let all: Vec<Scenario> = Scenario::names()
@@ -39,13 +39,12 @@ pub(crate) fn run(command: &Command) -> Result<(), Failure> {
                     .map(|s| serde_json::json!({ "name": s.name, "description": s.description }))
                     .collect();
                 let object = serde_json::json!({ "schema": SCHEMA, "scenarios": list });
-                output::result(&object.to_string());
+                output::result(&object.to_string())
             } else {
                 let lines: Vec<String> =
                     all.iter().map(|s| format!("{:16} {}", s.name, s.description)).collect();
-                output::result(&lines.join("\n"));
+                output::result(&lines.join("\n"))
             }
         }
     }
-    Ok(())
 }

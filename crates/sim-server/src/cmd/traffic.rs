@@ -1,22 +1,26 @@
 //! `traffic`: traffic alone, measured against recordings; calibration of the drivers; the
 //! fundamental diagram.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, ValueEnum};
 use road::Road;
+use serde::Serialize;
 use sim::{Overrides, Scenario, Traffic, TrafficKind};
 use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
 use traffic_client::Mode;
 use traffic_client::calibrate::{Effort, Lesson, calibrate, drive_bounded};
 use traffic_client::native::{Boundary, TrafficConfig};
-use traffic_client::replay::{Frame, Recording, Row, write_parquet};
+use traffic_client::replay::{Frame, Recording, Row, to_parquet};
 use traffic_client::stats::{Observer, Samples};
 
 use crate::cli::positive;
 use crate::failure::Failure;
+use crate::out_folder::{Out, OutFolder};
 use crate::output;
+use crate::progress::Stages;
 
 mod diagram;
 mod measured;
@@ -32,12 +36,12 @@ pub(crate) struct Args {
     /// A scenario file, or the name of a built-in one; its truck is left out.
     #[arg(long, default_value = "highway")]
     scenario: String,
-    /// Simulated time that is observed [default: 300, or the length of the recording].
-    #[arg(long, value_name = "S", value_parser = positive)]
+    /// Simulated time that is observed, at most a day [default: 300, or the length of the
+    /// recording]. Ctrl-C writes what there is by then.
+    #[arg(long, value_name = "S", value_parser = duration)]
     duration: Option<f64>,
-    /// Folder of the results.
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    #[command(flatten)]
+    out: Out,
     /// Recordings to compare with: files, or folders of them.
     #[arg(long, value_name = "MEASURED", num_args = 1..)]
     compare: Vec<PathBuf>,
@@ -91,8 +95,32 @@ const SEARCH_SEED: u64 = 0x5eed_0000;
 /// Time that is observed where nobody says otherwise, s.
 const DURATION_S: f64 = 300.0;
 
+/// Longest time that is observed, s.
+const LONGEST_S: f64 = 86_400.0;
+/// Most rows of the trajectories: 2.4 GB of memory with what the statistics keep of them.
+const MOST_ROWS: usize = 10_000_000;
+/// What is written.
+const RESULTS: &[&str] = &[
+    "trajectories.parquet",
+    "statistics.json",
+    "statistics.html",
+    "traffic.manifest.toml",
+    "calibrated.toml",
+    "diagram.json",
+    "diagram.html",
+    "sumo",
+];
+
+fn duration(text: &str) -> Result<f64, String> {
+    match positive(text)? {
+        s if s <= LONGEST_S => Ok(s),
+        _ => Err(format!("at most {LONGEST_S} s, a day")),
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    let out = args.out.folder(RESULTS)?;
     let mut scenario = Scenario::named(&args.scenario).map_err(Failure::input)?;
     let changes = Overrides {
         road: args.road.as_deref(),
@@ -111,20 +139,24 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let measured = read(&args.compare)?;
     let learned = read(&args.calibrate)?;
     if !args.calibrate.is_empty() {
-        scenario = calibrated(args, scenario, &learned, seed)?;
+        scenario = calibrated(args, &out, scenario, &learned, seed)?;
     }
     if args.diagram {
-        diagram::draw(&scenario, seed, &args.out)?;
+        diagram::draw(&scenario, seed, &out)?;
     }
-    let driven = drive(args, &scenario, seed)?;
-    let bounded = bounded(&scenario, seed, &measured)?;
+    let stop = out.stop_in_good_order();
+    let driven = drive(args, &out, &scenario, seed, &stop)?;
+    let bounded = match driven.end {
+        End::Interrupted => Vec::new(),
+        _ => bounded(&scenario, seed, &measured)?,
+    };
     let report = Report::new(&scenario, seed, &driven, &measured, &bounded, &args.calibrate);
     let json = serde_json::to_string_pretty(&report).map_err(Failure::work)?;
-    write(&args.out.join("statistics.json"), &json)?;
+    out.write("statistics.json", &json)?;
     let picture = plots::page(&report.sentence(), &driven.samples, &measured);
-    write(&args.out.join("statistics.html"), &picture)?;
-    output::result(if args.json { json } else { report.sentence() }.as_str());
-    Ok(())
+    out.write("statistics.html", picture)?;
+    out.keep();
+    output::result(if args.json { json } else { report.sentence() }.as_str())
 }
 
 /// Drives of bounded traffic per recording.
@@ -146,22 +178,41 @@ fn bounded(scenario: &Scenario, seed: u64, measured: &Measured) -> Result<Vec<Sa
 
 /// Traffic that was driven and looked at.
 pub(crate) struct Driven {
+    pub(crate) end: End,
     pub(crate) samples: traffic_client::stats::Samples,
     pub(crate) lanes_m: f64,
     pub(crate) engine: String,
     pub(crate) mode: Mode,
 }
 
+/// Why the traffic was not looked at any longer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum End {
+    TimeOver,
+    /// Ctrl-C, SIGTERM or SIGHUP.
+    Interrupted,
+    /// The trajectories have as many rows as they may.
+    RowLimit,
+}
+
 /// Drives the traffic of a scenario, and writes where everybody was.
-fn drive(args: &Args, scenario: &Scenario, seed: u64) -> Result<Driven, Failure> {
+fn drive(
+    args: &Args,
+    out: &OutFolder,
+    scenario: &Scenario,
+    seed: u64,
+    stop: &AtomicBool,
+) -> Result<Driven, Failure> {
     let road = Arc::new(scenario.load_road().map_err(Failure::input)?);
     let mut scenario = scenario.clone();
     scenario.traffic.native.scene_radius_m = road.length_m().max(1.0);
     scenario.traffic.replay.scene_radius_m = road.length_m().max(1.0);
     let geometry = Geometry::default();
-    let folder = args.out.join("sumo");
+    let sumo = (scenario.traffic.source == TrafficKind::Sumo).then(|| out.begin("sumo"));
+    let sumo = sumo.transpose()?;
     let mut traffic =
-        Traffic::new(&scenario, seed, &road, geometry, Some(&folder)).map_err(Failure::input)?;
+        Traffic::new(&scenario, seed, &road, geometry, sumo.as_deref()).map_err(Failure::input)?;
     let recorded_s = match scenario.traffic.source {
         TrafficKind::Replay => {
             Some(sim::recording_of(&scenario).map_err(Failure::input)?.duration_s() - LOOK_S)
@@ -169,13 +220,29 @@ fn drive(args: &Args, scenario: &Scenario, seed: u64) -> Result<Driven, Failure>
         _ => None,
     };
     let duration_s = args.duration.or(recorded_s).unwrap_or(DURATION_S);
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
     let ego = in_the_middle(&road);
     let (mut observer, mut rows) = (Observer::default(), Vec::new());
+    let mut end = End::TimeOver;
+    let stages = Stages::start();
     for k in 0..=(duration_s / LOOK_S) as i64 {
+        if stop.load(Ordering::Relaxed) {
+            end = End::Interrupted;
+            break;
+        }
         let now = Time::from_seconds(k as f64 * LOOK_S);
         let scene = traffic.advance(now, &ego).map_err(Failure::work)?;
+        if rows.len() + scene.neighbours.len() > MOST_ROWS {
+            output::note(&format!(
+                "traffic: ended at {} s, trajectories have {MOST_ROWS} rows at most",
+                now.seconds()
+            ));
+            end = End::RowLimit;
+            break;
+        }
         observer.look(scene, &road);
+        if k % 20 == 0 {
+            stages.show(&format!("driving traffic: {:.0} of {duration_s:.0} s", now.seconds()));
+        }
         rows.extend(scene.neighbours.iter().map(|n| Row {
             id: n.id,
             time_s: now.seconds(),
@@ -188,16 +255,18 @@ fn drive(args: &Args, scenario: &Scenario, seed: u64) -> Result<Driven, Failure>
             class: Some(n.class),
         }));
     }
+    stages.finish();
     if !rows.is_empty() {
         let recording = Recording::from_rows("trajectories", Frame::Map, rows, LOOK_S)
             .map_err(Failure::work)?;
-        let file = args.out.join("trajectories.parquet");
-        write_parquet(&file, &recording).map_err(Failure::work)?;
+        let bytes = to_parquet(&recording).map_err(Failure::work)?;
+        out.write("trajectories.parquet", bytes)?;
     }
     let manifest = traffic.manifest();
     let text = manifest.to_toml().map_err(Failure::work)?;
-    write(&args.out.join("traffic.manifest.toml"), &text)?;
+    out.write("traffic.manifest.toml", text)?;
     Ok(Driven {
+        end,
         samples: observer.samples,
         lanes_m: traffic_client::calibrate::lanes_m(&road),
         engine: manifest.engine,
@@ -215,6 +284,7 @@ fn in_the_middle(road: &Road) -> EgoState {
 /// The scenario with drivers like those of the recordings, on the recorded road; also written.
 fn calibrated(
     args: &Args,
+    out: &OutFolder,
     scenario: Scenario,
     learned: &Measured,
     seed: u64,
@@ -223,7 +293,8 @@ fn calibrated(
         return Err(Failure::Input("--calibrate: no recording".to_owned()));
     };
     let effort = Effort { generations: args.generations, seed, ..Effort::default() };
-    output::note("calibrating ...");
+    let stages = Stages::start();
+    stages.show("calibrating the drivers");
     // Judged later with traffic that was not driven in the search.
     let base = scenario.traffic.demand(seed ^ SEARCH_SEED);
     let lessons: Vec<Lesson<'_>> = learned
@@ -234,6 +305,7 @@ fn calibrated(
         .map(|((recording, road), samples)| Lesson { recording, road, samples })
         .collect();
     let found = calibrate(&lessons, &base, effort).map_err(Failure::input)?;
+    stages.finish();
     let mut scenario = scenario;
     scenario.name = format!("{}-calibrated", scenario.name);
     scenario.description = format!(
@@ -252,13 +324,8 @@ fn calibrated(
     traffic.replay.file = Some(absolute.display().to_string());
     traffic.replay.carriageway = args.carriageway.into();
     traffic.native = TrafficConfig { seed, ..found.config };
-    std::fs::create_dir_all(&args.out).map_err(|e| Failure::file(&args.out, e))?;
     let text = toml::to_string(&scenario).map_err(Failure::work)?;
-    write(&args.out.join("calibrated.toml"), &text)?;
+    out.write("calibrated.toml", text)?;
     scenario.traffic.mode = Some(Mode::Pure);
     Ok(scenario)
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::file(path, e))
 }

@@ -171,12 +171,12 @@ impl Drive {
     fn apply(&mut self, control: Control) {
         let now = self.start.elapsed();
         match control {
-            Control::Play {} => {
+            Control::Play => {
                 self.paused = false;
                 self.steps = 0;
                 self.pacer.restart(self.pacer.pace(), now);
             }
-            Control::Pause {} => {
+            Control::Pause => {
                 self.paused = true;
                 self.steps = 0;
             }
@@ -185,7 +185,7 @@ impl Drive {
                 self.steps = self.steps.saturating_add(ticks);
                 self.pacer.restart(self.pacer.pace(), now);
             }
-            Control::Pace { pace } => self.pacer.restart(pace, now),
+            Control::Pace(pace) => self.pacer.restart(pace, now),
             Control::LaneChange { to } => self.job.world.stack_mut().request_lane_change(to),
         }
     }

@@ -61,9 +61,9 @@ pub(super) struct McapFile {
 impl McapFile {
     /// Creates the file; it must be possible to write there.
     pub(super) fn create(path: &Path) -> Result<Self, Failure> {
-        let file = File::create(path).map_err(|e| Failure::file(path, e))?;
+        let file = File::create(path).map_err(|e| Failure::writing(path, &e))?;
         let writer =
-            write_options().create(BufWriter::new(file)).map_err(|e| Failure::file(path, e))?;
+            write_options().create(BufWriter::new(file)).map_err(|e| Failure::writing(path, &e))?;
         Ok(Self { path: path.to_owned(), writer, sequence: BTreeMap::new(), buffer: Vec::new() })
     }
 
@@ -145,19 +145,19 @@ impl McapFile {
 
     /// Writes the summary section; the file is whole after it.
     pub(super) fn finish(mut self) -> Result<(), Failure> {
-        self.writer.finish().map_err(|e| Failure::work_on(&self.path, &e))?;
+        self.writer.finish().map_err(|e| Failure::writing(&self.path, &e))?;
         let file = self.writer.into_inner().into_inner();
-        let file = file.map_err(|e| Failure::work_on(&self.path, e.error()))?;
+        let file = file.map_err(|e| Failure::writing(&self.path, e.error()))?;
         match file.sync_all() {
             // A pipe or device has nothing to sync.
             Err(e) if e.kind() != std::io::ErrorKind::InvalidInput => {
-                Err(Failure::work_on(&self.path, &e))
+                Err(Failure::writing(&self.path, &e))
             }
             _ => Ok(()),
         }
     }
 
-    fn failed(&self, error: impl std::error::Error) -> Failure {
-        Failure::work_on(&self.path, &error)
+    fn failed(&self, error: impl std::error::Error + 'static) -> Failure {
+        Failure::writing(&self.path, &error)
     }
 }

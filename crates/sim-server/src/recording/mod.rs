@@ -16,5 +16,5 @@ pub(crate) mod ros;
 mod telemetry;
 
 pub(crate) use layout::Layout;
-pub(crate) use recorder::{Recording, RunHeader};
+pub(crate) use recorder::{Recording, RunHeader, Torn};
 pub(crate) use telemetry::Combination;

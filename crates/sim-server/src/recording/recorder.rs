@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -65,7 +65,8 @@ impl Record {
 /// A recording under way.
 pub(crate) struct Recording {
     sender: SyncSender<Record>,
-    thread: JoinHandle<Result<McapFile, Failure>>,
+    path: PathBuf,
+    thread: JoinHandle<(McapFile, Time, Result<(), Failure>)>,
     broken: bool,
     scene_due: Time,
 }
@@ -74,7 +75,7 @@ impl Recording {
     /// Creates the file, writes what is known before the first tick, and starts the writer.
     ///
     /// # Errors
-    /// [`Failure::Input`] when the file cannot be created.
+    /// [`Failure`] when the file cannot be created.
     pub(crate) fn create(path: &Path, header: RunHeader) -> Result<Self, Failure> {
         let mut file = McapFile::create(path)?;
         file.metadata("run", header.metadata)?;
@@ -87,7 +88,8 @@ impl Recording {
         let tracks = Tracks::open(file, scenery)?;
         let (sender, receiver) = sync_channel(QUEUE_TICKS);
         let thread = spawn(move || tracks.run(&receiver))?;
-        Ok(Self { sender, thread, broken: false, scene_due: Time::ZERO })
+        let path = path.to_owned();
+        Ok(Self { sender, path, thread, broken: false, scene_due: Time::ZERO })
     }
 
     /// Whether the writer has given up; the run must end, [`Self::finish`] says why.
@@ -98,15 +100,38 @@ impl Recording {
     /// Waits until everything is written, attaches the summary and closes the file.
     ///
     /// # Errors
-    /// [`Failure::Work`] names the file and what went wrong, at whatever tick it did.
-    pub(crate) fn finish(self, summary_json: &str) -> Result<(), Failure> {
+    /// [`Torn`] with the file and what went wrong, at whatever tick it did.
+    pub(crate) fn finish(self, summary_json: &str) -> Result<(), Torn> {
         drop(self.sender);
-        let mut file = self
-            .thread
-            .join()
-            .map_err(|_| Failure::Work("the recording thread panicked".to_owned()))??;
-        file.attach("summary.json", "application/json", summary_json.as_bytes())?;
-        file.finish()
+        let path = self.path;
+        let Ok((mut file, kept, written)) = self.thread.join() else {
+            let why = Failure::Work("the recording thread panicked".to_owned());
+            return Err(Torn { why, path, kept_s: 0.0 });
+        };
+        written
+            .and_then(|()| file.attach("summary.json", "application/json", summary_json.as_bytes()))
+            .and_then(|()| file.finish())
+            .map_err(|why| Torn { why, path, kept_s: kept.seconds() })
+    }
+}
+
+/// A recording without an end.
+#[derive(Debug)]
+pub(crate) struct Torn {
+    why: Failure,
+    path: PathBuf,
+    /// Simulated time up to which it is whole, s.
+    pub(crate) kept_s: f64,
+}
+
+impl Torn {
+    /// Why, and what helps.
+    pub(crate) fn into_failure(self) -> Failure {
+        if self.kept_s <= 0.0 {
+            return self.why;
+        }
+        let (path, kept_s) = (self.path.display(), self.kept_s);
+        self.why.hint(&format!("its first {kept_s:.0} s are saved by `sim-server recover {path}`"))
     }
 }
 
@@ -198,15 +223,23 @@ impl Tracks {
         Ok(tracks)
     }
 
-    fn run(mut self, records: &Receiver<Record>) -> Result<McapFile, Failure> {
+    /// Writes until the sender is gone; also says up to when the file is whole.
+    fn run(mut self, records: &Receiver<Record>) -> (McapFile, Time, Result<(), Failure>) {
+        let mut kept = Time::ZERO;
+        let written = self.write_all(records, &mut kept);
+        (self.file, kept, written)
+    }
+
+    fn write_all(&mut self, records: &Receiver<Record>, kept: &mut Time) -> Result<(), Failure> {
         while let Ok(record) = records.recv() {
             self.write(&record)?;
             if record.now >= self.flush_due {
                 self.flush_due = record.now.plus_nanos(FLUSH_PERIOD.0);
                 self.file.flush()?;
+                *kept = record.now;
             }
         }
-        Ok(self.file)
+        Ok(())
     }
 
     fn write(&mut self, record: &Record) -> Result<(), Failure> {

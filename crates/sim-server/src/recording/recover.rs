@@ -42,8 +42,11 @@ pub(crate) fn recover(path: &Path) -> Result<Recovered, Failure> {
         _ => return Err(Failure::file(path, "not an MCAP file")),
     }
     let target = path.with_extension("recovered.mcap");
-    let output = File::create_new(&target).map_err(|e| Failure::file(&target, e))?;
-    let failed = |e: mcap::McapError| Failure::work_on(&target, &e);
+    let output = File::create_new(&target).map_err(|e| Failure::writing(&target, &e))?;
+    let failed = |e: mcap::McapError| {
+        let _ = std::fs::remove_file(&target);
+        Failure::writing(&target, &e)
+    };
     let writer = write_options().create(BufWriter::new(output)).map_err(failed)?;
     let mut copy = Copy { writer, kept: Recovered { file: target.clone(), ..Default::default() } };
     loop {

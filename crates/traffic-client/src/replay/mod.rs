@@ -14,7 +14,7 @@ mod source;
 pub use commonroad::read_commonroad;
 pub use csv::{Carriageway, read_csv};
 pub use line::road_of;
-pub use parquet::{read_parquet, write_parquet};
+pub use parquet::{read_parquet, to_parquet};
 pub(crate) use recording::class_of_length;
 pub use recording::{Frame, Recording, Row, Sample, Track};
 pub use source::{ReplayConfig, ReplayTraffic};

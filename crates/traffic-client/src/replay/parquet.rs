@@ -7,7 +7,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use ::parquet::basic::Compression;
+use ::parquet::basic::{Compression, CompressionCodec as Codec};
 use ::parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
@@ -35,6 +35,15 @@ pub fn read_parquet(path: &Path) -> Result<Vec<Row>, ReplayError> {
     let bad = |why: String| ReplayError::Format { name: name.clone(), why };
     let file = File::open(path).map_err(|e| super::file_error(path, &e))?;
     let reader = SerializedFileReader::new(file).map_err(|e| bad(e.to_string()))?;
+    let groups = reader.metadata().row_groups();
+    if let Some(column) =
+        groups.iter().flat_map(|g| g.columns()).find(|c| !is_read(c.compression_codec()))
+    {
+        let (name, codec) = (column.column_path(), column.compression_codec());
+        let why =
+            format!("column {name} is compressed with {codec:?}; snappy, zstd and none are read");
+        return Err(bad(why));
+    }
     let mut rows = Vec::new();
     for (k, record) in reader.get_row_iter(None).map_err(|e| bad(e.to_string()))?.enumerate() {
         let record = record.map_err(|e| bad(format!("row {}: {e}", k + 1)))?;
@@ -69,6 +78,10 @@ pub fn read_parquet(path: &Path) -> Result<Vec<Row>, ReplayError> {
     Ok(rows)
 }
 
+fn is_read(codec: Codec) -> bool {
+    matches!(codec, Codec::UNCOMPRESSED | Codec::SNAPPY | Codec::ZSTD)
+}
+
 fn number(field: &Field) -> Option<f64> {
     Some(match field {
         Field::Double(x) => *x,
@@ -84,18 +97,18 @@ fn number(field: &Field) -> Option<f64> {
     .filter(|x| x.is_finite())
 }
 
-/// Writes a recording.
+/// A recording as the bytes of a Parquet file.
 ///
 /// # Errors
-/// [`ReplayError::File`].
-pub fn write_parquet(path: &Path, recording: &Recording) -> Result<(), ReplayError> {
-    let fail = |why: String| ReplayError::File { path: path.display().to_string(), why };
-    let file = File::create(path).map_err(|e| super::file_error(path, &e))?;
+/// [`ReplayError::Format`] if it cannot be encoded.
+pub fn to_parquet(recording: &Recording) -> Result<Vec<u8>, ReplayError> {
+    let fail = |why: String| ReplayError::Format { name: recording.name.clone(), why };
+    let mut file = Vec::new();
     let schema = Arc::new(parse_message_type(SCHEMA).map_err(|e| fail(e.to_string()))?);
     let properties =
         Arc::new(WriterProperties::builder().set_compression(Compression::SNAPPY).build());
-    let mut writer =
-        SerializedFileWriter::new(file, schema, properties).map_err(|e| fail(e.to_string()))?;
+    let mut writer = SerializedFileWriter::new(&mut file, schema, properties)
+        .map_err(|e| fail(e.to_string()))?;
     let all =
         || recording.tracks.iter().flat_map(|t| t.samples.iter().enumerate().map(move |s| (t, s)));
     let ids: Vec<i64> = all().map(|(t, _)| t.id as i64).collect();
@@ -129,7 +142,8 @@ pub fn write_parquet(path: &Path, recording: &Recording) -> Result<(), ReplayErr
         writer.close()?;
         Ok(())
     };
-    write().map_err(|e| fail(e.to_string()))
+    write().map_err(|e| fail(e.to_string()))?;
+    Ok(file)
 }
 
 fn class_name(class: VehicleClass) -> &'static str {

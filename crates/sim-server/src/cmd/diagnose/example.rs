@@ -5,7 +5,6 @@
 //! Cause, size, loads, speeds, weather, traffic, tolerances and noise are drawn by the seed. The
 //! diagnosis sees the drives only; `hidden.json` holds the answer.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use diagnosis::logger::Draw;
@@ -19,6 +18,7 @@ use sim::{Scenario, Status, TrafficKind, World};
 use super::folder;
 use super::logger::drive;
 use crate::failure::Failure;
+use crate::out_folder::OutFolder;
 use crate::provenance::Provenance;
 
 /// Truck of the example.
@@ -65,7 +65,8 @@ pub(super) struct Hidden {
 ///
 /// # Errors
 /// [`Failure`] if a file cannot be written or a world fails.
-pub(super) fn measure(out: &Path, seed: u64, threads: &Threads) -> Result<Hidden, Failure> {
+pub(super) fn measure(out: &OutFolder, seed: u64, threads: &Threads) -> Result<Hidden, Failure> {
+    let drives_at = out.begin("drives")?;
     let truck = TruckParameters::load(TRUCK).map_err(Failure::work)?;
     let hidden = hide(&truck, seed)?;
     let scenario = Scenario::builtin("highway").map_err(Failure::work)?;
@@ -78,9 +79,8 @@ pub(super) fn measure(out: &Path, seed: u64, threads: &Threads) -> Result<Hidden
     });
     let mut tables: Vec<folder::Table> = tables.into_iter().collect::<Result<_, _>>()?;
     let clean = tables.split_off(DRIVES);
-    std::fs::create_dir_all(out).map_err(|e| Failure::file(out, e))?;
-    folder::write(&out.join("drives"), TRUCK, &tables)?;
-    folder::write(&out.join("baseline"), TRUCK, &clean)?;
+    folder::write(&drives_at, TRUCK, &tables)?;
+    folder::write(&out.begin("baseline")?, TRUCK, &clean)?;
     #[derive(Serialize)]
     struct Answer<'a> {
         #[serde(flatten)]
@@ -90,7 +90,7 @@ pub(super) fn measure(out: &Path, seed: u64, threads: &Threads) -> Result<Hidden
     }
     let answer = Answer { provenance: Provenance::of_seed(seed), hidden: &hidden };
     let text = serde_json::to_string_pretty(&answer).map_err(Failure::work)?;
-    super::write(&out.join("hidden.json"), &text)?;
+    out.write("hidden.json", text)?;
     Ok(hidden)
 }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::failure::Failure;
+use crate::out_folder::write_whole;
 
 /// Table rate of a drive, s.
 pub(super) const STEP_S: f64 = 0.05;
@@ -70,7 +71,7 @@ struct Entry {
 
 /// Writes a folder of drives of a truck, all started with cold tyres.
 pub(super) fn write(folder: &Path, truck: &str, tables: &[Table]) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, e))?;
+    std::fs::create_dir_all(folder).map_err(|e| Failure::writing(folder, &e))?;
     let entry = |t: &'_ Table| Entry {
         name: t.name.clone(),
         file: format!("{}.csv", t.name),
@@ -79,8 +80,8 @@ pub(super) fn write(folder: &Path, truck: &str, tables: &[Table]) -> Result<(), 
     };
     let index = Index { schema: 1, truck, drive: tables.iter().map(entry).collect() };
     for table in tables {
-        super::write(&folder.join(format!("{}.csv", table.name)), &table.csv())?;
+        write_whole(&folder.join(format!("{}.csv", table.name)), table.csv().as_bytes())?;
     }
     let text = toml::to_string(&index).map_err(Failure::work)?;
-    super::write(&folder.join("drives.toml"), &text)
+    write_whole(&folder.join("drives.toml"), text.as_bytes())
 }

@@ -6,8 +6,9 @@ use diagnosis::{Diagnosis, Outcome, TableTrial, Verdict};
 use serde_json::{Value, json};
 
 use super::example::{ClosedLoop, Hidden};
-use super::{report, write};
+use super::report;
 use crate::failure::Failure;
+use crate::out_folder::OutFolder;
 use crate::provenance::Provenance;
 
 /// A diagnosis with everything that goes into its files.
@@ -20,10 +21,10 @@ pub(super) struct Results {
 
 impl Results {
     /// Writes `diagnosis.json` and `report.html`; the text of the former.
-    pub(super) fn write(&self, out: &Path) -> Result<String, Failure> {
+    pub(super) fn write(&self, out: &OutFolder) -> Result<String, Failure> {
         let json = self.json()?;
         let text = serde_json::to_string_pretty(&json).map_err(Failure::work)?;
-        write(&out.join("diagnosis.json"), &text)?;
+        out.write("diagnosis.json", &text)?;
         let Outcome { drives_name, found, figures, extension, .. } = &self.outcome;
         let overlay = extension.overlay.as_ref().map(toml::to_string).transpose();
         let overlay = overlay.map_err(Failure::work)?;
@@ -32,7 +33,7 @@ impl Results {
         });
         let (drives, overlay) = (drives_name.as_str(), overlay.as_deref());
         let page = report::page(found, &json, figures, drives, overlay, example);
-        write(&out.join("report.html"), &page)?;
+        out.write("report.html", page)?;
         Ok(text)
     }
 

@@ -6,18 +6,24 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use sim::{RunReport, Scenario, WallClock, World};
+use planner::decider::DeciderKind;
+use sim::{EndReason, RunReport, Scenario, TrafficKind, WallClock, World};
+use tokio::sync::Notify;
 use tractrix_core::Vehicle;
 
 use super::Args;
 use crate::dashboard::{self, Dashboard, Publisher, Shared};
 use crate::driver::{self, ControlSender, Ended, Job, Pace, drive};
 use crate::failure::Failure;
+use crate::out_folder::OutFolder;
 use crate::output;
 use crate::progress::Progress;
 use crate::provenance::{GIT_REVISION, Provenance, VERSION};
-use crate::recording::{Combination, Recording, RunHeader};
+use crate::recording::{Combination, Recording, RunHeader, Torn};
+use crate::signals::stop_signal;
 
+/// What is written.
+const RESULTS: &[&str] = &["run.mcap", "summary.json", "traffic.manifest.toml", "sumo"];
 /// Longest report that the dashboard serves.
 const MAX_REPORT_BYTES: u64 = 64 << 20;
 /// Viewers get this long to take the last frame before the server goes.
@@ -26,23 +32,28 @@ const LAST_FRAME_TIME: Duration = Duration::from_millis(200);
 /// Drives the scenario as the options say.
 pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(), Failure> {
     let listener = if args.headless { None } else { Some(dashboard::bind(args.port)?) };
-    let folder = out_folder(args, seed, scenario);
-    let world = World::in_folder(scenario, seed, &folder.join("sumo")).map_err(Failure::input)?;
-    let provenance = Provenance::of_seed(seed);
+    let out = OutFolder::new(out_folder(args, seed, scenario), args.overwrite, RESULTS)?;
+    let sumo = match scenario.traffic.source {
+        TrafficKind::Sumo => out.begin("sumo")?,
+        _ => out.path().join("sumo"),
+    };
+    let world = World::in_folder(scenario, seed, &sumo).map_err(Failure::input)?;
+    let (provenance, started) = (Provenance::of_seed(seed), unix_time());
     let combination = Combination::new(world.truck().limits());
     let (controls, received) = driver::channel();
     let shared = listener.is_some().then(|| {
         let road = dashboard::road_json(world.road(), &combination);
-        Shared::new(road, report_of(&scenario.truck.file), controls.clone())
+        let external = scenario.stack.decider == DeciderKind::External;
+        Shared::new(road, report_of(&scenario.truck.file), external, controls.clone())
     });
     let publisher = shared.as_ref().map(|shared| {
         let road = Arc::clone(world.road());
-        Publisher::new(Arc::clone(shared), provenance, scenario, road)
+        Publisher::new(Arc::clone(shared), provenance, run_id(started), scenario, road)
     });
     let stop = Arc::new(AtomicBool::new(false));
     let pace = args.pace.unwrap_or(if args.headless { Pace::Max } else { Pace::REALTIME });
     let job = Job {
-        recording: start_recording(&folder, seed, scenario, &world, combination)?,
+        recording: start_recording(&out, started, seed, scenario, &world, combination)?,
         progress: Progress::of_run(&world),
         world,
         pace,
@@ -61,21 +72,25 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
         runtime.spawn(Dashboard::new(listener, shared).serve());
     }
     let keep_open = args.keep_open;
-    let ended = runtime.block_on(wait_for_end(job, stop, controls))?;
-    let result = finish(ended, provenance, pace, &folder);
+    let asked = Arc::new(Notify::new());
+    runtime.spawn(raise_at_signal(stop, Arc::clone(&asked)));
+    let ended = runtime.block_on(wait_for_end(job, controls));
+    // What was recorded before a panic can be recovered.
+    let ended = ended.inspect_err(|_| out.keep())?;
+    let interrupted = ended.reason == EndReason::Interrupted;
+    let result = finish(ended, provenance, pace, &out);
     if !args.headless {
         runtime.block_on(async {
             tokio::time::sleep(LAST_FRAME_TIME).await;
-            if keep_open && result.is_ok() {
+            if keep_open && !interrupted && result.is_ok() {
                 output::note("the run has ended; Ctrl-C closes the dashboard");
-                stop_signal().await;
+                asked.notified().await;
             }
         });
     }
     runtime.shutdown_background();
     let (summary, json) = result?;
-    report(args.json, &summary, &json, &folder);
-    Ok(())
+    report(args.json, &summary, &json, &out.path())
 }
 
 /// The report of the diagnosis that wrote a truck file: it lies beside it.
@@ -101,62 +116,59 @@ fn out_folder(args: &Args, seed: u64, scenario: &Scenario) -> PathBuf {
     folder
 }
 
+/// Time since 1970.
 #[expect(clippy::disallowed_methods, reason = "the shell owns the clock")]
+fn unix_time() -> Duration {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default()
+}
+
+/// Tells runs apart that follow each other on a port.
+fn run_id(started: Duration) -> String {
+    format!("{:x}-{:x}", started.as_nanos(), std::process::id())
+}
+
 fn start_recording(
-    folder: &Path,
+    out: &OutFolder,
+    started: Duration,
     seed: u64,
     scenario: &Scenario,
     world: &World,
     combination: Combination,
 ) -> Result<Recording, Failure> {
-    let started_s = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |d| d.as_secs_f64());
     let metadata = BTreeMap::from([
         ("schema".to_owned(), "1".to_owned()),
         ("seed".to_owned(), seed.to_string()),
         ("version".to_owned(), VERSION.to_owned()),
         ("git_revision".to_owned(), GIT_REVISION.to_owned()),
         ("scenario".to_owned(), scenario.name.clone()),
-        ("started_unix_s".to_owned(), format!("{started_s:.3}")),
+        ("started_unix_s".to_owned(), format!("{:.3}", started.as_secs_f64())),
     ]);
     let scenario_toml = toml::to_string(scenario).map_err(Failure::work)?;
-    std::fs::create_dir_all(folder).map_err(|e| Failure::file(folder, e))?;
     let road = Arc::clone(world.road());
     let header = RunHeader { metadata, scenario_toml, road, combination };
-    Recording::create(&folder.join("run.mcap"), header)
+    Recording::create(&out.begin("run.mcap")?, header)
 }
 
-/// Drives the job in the world's own thread; Ctrl-C and SIGTERM stop it between two ticks.
-async fn wait_for_end(
-    job: Job,
-    stop: Arc<AtomicBool>,
-    controls: ControlSender,
-) -> Result<Ended, Failure> {
+/// A signal stops the run between two ticks, and ends the waiting of whoever waits for it.
+async fn raise_at_signal(stop: Arc<AtomicBool>, asked: Arc<Notify>) {
+    loop {
+        stop_signal().await;
+        stop.store(true, Ordering::Relaxed);
+        asked.notify_one();
+    }
+}
+
+/// Drives the job in the world's own thread.
+async fn wait_for_end(job: Job, controls: ControlSender) -> Result<Ended, Failure> {
     let (sender, receiver) = tokio::sync::oneshot::channel();
     #[expect(clippy::disallowed_methods, reason = "the shell owns the world's thread")]
     let thread = std::thread::spawn(move || {
         let _ = sender.send(drive(job));
     });
-    let signals = tokio::spawn(async move {
-        stop_signal().await;
-        stop.store(true, Ordering::Relaxed);
-    });
     let ended = receiver.await.map_err(|_| Failure::Work("the world's thread panicked".to_owned()));
-    signals.abort();
     drop(controls);
     let _ = thread.join();
     ended
-}
-
-/// Ctrl-C or SIGTERM.
-async fn stop_signal() {
-    use tokio::signal::unix::{SignalKind, signal};
-    let Ok(mut terminate) = signal(SignalKind::terminate()) else {
-        return std::future::pending().await;
-    };
-    tokio::select! {
-        _ = tokio::signal::ctrl_c() => {}
-        _ = terminate.recv() => {}
-    }
 }
 
 /// Closes the recording and writes the summary, also of a run that failed.
@@ -164,7 +176,7 @@ fn finish(
     ended: Ended,
     provenance: Provenance,
     pace: Pace,
-    folder: &Path,
+    out: &OutFolder,
 ) -> Result<(RunReport, String), Failure> {
     let wall = WallClock {
         missed_deadlines: ended.missed_deadlines,
@@ -178,12 +190,14 @@ fn finish(
         publisher.publish_summary(&json);
     }
     let recorded = ended.recording.finish(&json);
-    let path = folder.join("summary.json");
-    std::fs::write(&path, &json).map_err(|e| Failure::work_on(&path, &e))?;
-    recorded?;
-    let path = folder.join("traffic.manifest.toml");
+    if !matches!(&recorded, Err(torn) if torn.kept_s <= 0.0) {
+        out.keep();
+    }
+    let summary_written = out.write("summary.json", &json);
+    recorded.map_err(Torn::into_failure)?;
+    summary_written?;
     let text = ended.world.traffic().manifest().to_toml().map_err(Failure::work)?;
-    std::fs::write(&path, text).map_err(|e| Failure::work_on(&path, &e))?;
+    out.write("traffic.manifest.toml", text)?;
     if let Some(why) = ended.world.traffic().failure() {
         output::note(&format!("traffic: {why}; the native engine went on"));
     }
@@ -194,7 +208,7 @@ fn finish(
 }
 
 /// The result on stdout.
-fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) {
+fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) -> Result<(), Failure> {
     if as_json {
         return output::result(json);
     }
@@ -212,7 +226,7 @@ fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) {
         s.max_lateral_error_m,
         s.guard_activations,
         folder.display(),
-    ));
+    ))
 }
 
 /// Density of diesel fuel, g/l (EN 590, middle of 820 to 845).

@@ -14,9 +14,10 @@ use sim::{Scenario, Traffic, TrafficKind};
 use tractrix_core::{Geometry, Time, TrafficSource};
 use traffic_client::sumo::Programs;
 
+use super::in_the_middle;
 use super::plots::{Curve, Panel, html};
-use super::{in_the_middle, write};
 use crate::failure::Failure;
+use crate::out_folder::OutFolder;
 use crate::output;
 use crate::provenance::Provenance;
 
@@ -45,8 +46,7 @@ struct Diagram {
 }
 
 /// Writes diagram.json and diagram.html.
-pub(super) fn draw(scenario: &Scenario, seed: u64, out: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(out).map_err(|e| Failure::file(out, e))?;
+pub(super) fn draw(scenario: &Scenario, seed: u64, out: &OutFolder) -> Result<(), Failure> {
     let road = Arc::new(builtin::flat(ROAD_M));
     let curve = |source| -> Result<Vec<Point>, Failure> {
         DENSITIES_1_KM.iter().map(|&k| point(scenario, seed, &road, source, k)).collect()
@@ -77,11 +77,11 @@ pub(super) fn draw(scenario: &Scenario, seed: u64, out: &Path) -> Result<(), Fai
         Panel { abscissa, ordinate: "speed, m/s", curves: curves(|p| p.speed_m_s) },
     ];
     let text = format!("Drivers of {}, a level road of two lanes.", scenario.name);
-    write(&out.join("diagram.html"), &html("Fundamental diagram", &text, &panels))?;
+    out.write("diagram.html", html("Fundamental diagram", &text, &panels))?;
     let name = scenario.name.clone();
     let diagram = Diagram { provenance: Provenance::of_seed(seed), scenario: name, native, sumo };
     let json = serde_json::to_string_pretty(&diagram).map_err(Failure::work)?;
-    write(&out.join("diagram.json"), &json)
+    out.write("diagram.json", json)
 }
 
 fn point(

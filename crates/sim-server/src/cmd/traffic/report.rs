@@ -11,8 +11,8 @@ use traffic_client::stats::{
     moments, wasserstein,
 };
 
-use super::Driven;
 use super::measured::Measured;
+use super::{Driven, End};
 use crate::provenance::Provenance;
 
 /// The whole file.
@@ -24,6 +24,7 @@ pub(super) struct Report {
     road: String,
     engine: String,
     mode: Mode,
+    end_reason: End,
     /// Recordings that the drivers were calibrated to.
     calibrated_to: Vec<String>,
     simulated: Figures,
@@ -251,6 +252,7 @@ impl Report {
             road: scenario.road.clone(),
             engine: driven.engine.clone(),
             mode: driven.mode,
+            end_reason: driven.end,
             calibrated_to: calibrated_to.iter().map(|p| p.display().to_string()).collect(),
             simulated: figures(&driven.samples, driven.lanes_m),
             measured: there.then(|| figures(&measured.samples, measured.lanes_m)),
