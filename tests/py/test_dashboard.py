@@ -52,13 +52,15 @@ class Run:
 
 
 @contextmanager
-def running(server: Path, folder: Path, *options: str) -> Iterator[Run]:
-    """Starts a run with a dashboard on a free port."""
+def running(
+    server: Path, folder: Path, *options: str, port: str = "0"
+) -> Iterator[Run]:
+    """Starts a run with a dashboard, on a free port if none is named."""
     command: list[str | Path] = [
         server,
         "run",
         "--port",
-        "0",
+        port,
         "--out",
         folder,
         *options,
@@ -220,6 +222,34 @@ def test_a_late_viewer_gets_the_plots_from_the_start(
         assert first < 0.06
         assert run.get("/api/v1/summary")["end_reason"] == "time_over"
         assert run.finish() == 0
+
+
+def test_a_tab_that_stays_open_shows_the_next_run_on_its_port(
+    server: Path, browser: Browser, tmp_path: Path
+) -> None:
+    """It kept the road, the limits and the plots of the first run."""
+    # Not the fixture: while nobody answers, the browser says so on the console.
+    tab = browser.new_page()
+    tab.set_default_timeout(WAIT_MS)
+    options = ["--duration", "20", "--pace", "max", "--keep-open"]
+    with running(server, tmp_path / "first", "flat", *options) as run:
+        tab.goto(run.url)
+        tab.wait_for_function(
+            "document.getElementById('state').textContent === 'finished'"
+        )
+        first_length = tab.inner_text("#station-sub")
+        port = run.url.rsplit(":", 1)[1]
+        assert run.finish() == 0
+    with running(server, tmp_path / "next", "highway-empty", port=port):
+        tab.wait_for_function(
+            "document.getElementById('scenario').textContent === 'highway-empty'"
+        )
+        tab.wait_for_function(
+            "document.getElementById('state').textContent === 'running'"
+        )
+        assert tab.inner_text("#station-sub").split("·")[0] != first_length.split("·")[0]
+        plots_are_there(tab)
+    tab.close()
 
 
 def plots_are_there(page: Page) -> None:

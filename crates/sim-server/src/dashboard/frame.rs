@@ -19,6 +19,8 @@ pub(super) struct Frame<'a> {
     pub(super) provenance: Provenance,
     /// Tells frames from strip columns on the WebSocket.
     pub(super) kind: &'static str,
+    /// Another run answers on the same port with another one.
+    pub(super) run_id: &'a str,
     pub(super) time_s: f64,
     pub(super) run: Run<'a>,
     pub(super) ego: Ego,

@@ -36,6 +36,8 @@ pub(crate) struct Shared {
     road: Arc<str>,
     /// The report of the diagnosis that the truck comes from, as a page.
     report: Option<Arc<str>>,
+    /// Lane changes are wished from outside.
+    external_decider: bool,
     /// To the world's thread.
     controls: ControlSender,
 }
@@ -45,6 +47,7 @@ impl Shared {
     pub(crate) fn new(
         road_json: String,
         report: Option<String>,
+        external_decider: bool,
         controls: ControlSender,
     ) -> Arc<Self> {
         Arc::new(Self {
@@ -53,6 +56,7 @@ impl Shared {
             summary: Mutex::new(Arc::from("{}")),
             road: road_json.into(),
             report: report.map(Arc::from),
+            external_decider,
             controls,
         })
     }

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use planner::decider::DeciderKind;
 use road::Road;
 use serde::Serialize;
 use sim::{Scenario, Summary, World};
@@ -20,8 +19,8 @@ use crate::provenance::Provenance;
 pub(crate) struct Publisher {
     shared: Arc<Shared>,
     provenance: Provenance,
+    run_id: String,
     scenario: String,
-    external_decider: bool,
     road: Arc<Road>,
     snapshot: Option<Snapshot>,
     /// Wall and simulated seconds of an earlier frame, for the factor.
@@ -46,14 +45,15 @@ impl Publisher {
     pub(crate) fn new(
         shared: Arc<Shared>,
         provenance: Provenance,
+        run_id: String,
         scenario: &Scenario,
         road: Arc<Road>,
     ) -> Self {
         Self {
             shared,
             provenance,
+            run_id,
             scenario: scenario.name.clone(),
-            external_decider: scenario.stack.decider == DeciderKind::External,
             road,
             snapshot: None,
             mark: (0.0, 0.0),
@@ -73,11 +73,12 @@ impl Publisher {
         let frame = Frame {
             provenance: self.provenance,
             kind: "frame",
+            run_id: &self.run_id,
             time_s,
             run: Run {
                 scenario: &self.scenario,
                 state,
-                external_decider: self.external_decider,
+                external_decider: self.shared.external_decider,
                 pace,
                 realtime_factor: round(self.realtime_factor, 100.0),
                 distance_m: round(summary.distance_m, 10.0),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::{Request, State};
-use axum::http::{HeaderMap, StatusCode, Uri, header};
+use axum::http::{HeaderMap, Uri, header};
 use axum::middleware::{self, Next};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
@@ -61,29 +61,25 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/report", get(report))
         .route("/ws", get(socket::upgrade))
         .fallback(page)
+        .method_not_allowed_fallback(api::wrong_method)
         .layer(middleware::from_fn(local_only))
         .with_state(shared)
 }
 
 async fn page(State(shared): State<Arc<Shared>>, uri: Uri) -> Response {
-    assets::asset(uri.path(), shared.report.is_some())
-        .unwrap_or_else(|| StatusCode::NOT_FOUND.into_response())
+    assets::asset(uri.path(), shared.report.is_some()).unwrap_or_else(|| api::not_found(uri.path()))
 }
 
 /// The report of the diagnosis that the truck comes from.
 async fn report(State(shared): State<Arc<Shared>>) -> Response {
     let page = |text: &Arc<str>| Html(text.to_string()).into_response();
-    shared.report.as_ref().map_or_else(|| StatusCode::NOT_FOUND.into_response(), page)
+    shared.report.as_ref().map_or_else(|| api::not_found("/report"), page)
 }
 
 /// Refuses requests that another web site makes through the user's browser: a foreign `Host`
 /// (a name bound to 127.0.0.1) or a foreign `Origin`.
 async fn local_only(request: Request, next: Next) -> Response {
-    if is_own(request.headers()) {
-        next.run(request).await
-    } else {
-        (StatusCode::FORBIDDEN, "only pages of this server may ask").into_response()
-    }
+    if is_own(request.headers()) { next.run(request).await } else { api::foreign() }
 }
 
 fn is_own(headers: &HeaderMap) -> bool {

@@ -17,6 +17,8 @@ pub(crate) enum Pace {
 impl Pace {
     /// One simulated second per second.
     pub(crate) const REALTIME: Self = Self::Factor(1.0);
+    /// What a pace can be, in words.
+    pub(crate) const VALUES: &str = "realtime, max or a factor from 0.01 to 10000";
 }
 
 /// Paces that make sense to a viewer and to a clock.
@@ -34,7 +36,7 @@ impl FromStr for Pace {
                 .ok()
                 .filter(|factor| FACTORS.contains(factor))
                 .map(Self::Factor)
-                .ok_or_else(|| "a pace is realtime, max or a factor from 0.01 to 10000".into()),
+                .ok_or_else(|| format!("a pace is {}", Self::VALUES)),
         }
     }
 }

@@ -25,6 +25,8 @@ function connect() {
   socket.onmessage = (event) => {
     const message = JSON.parse(event.data);
     if (message.kind === "frame") {
+      // Another run has taken the port: its road, limits and plots are other ones.
+      if (frame && frame.run_id !== message.run_id) return location.reload();
       frame = message;
       view.push(frame);
       ahead.push(frame);
@@ -37,7 +39,7 @@ function connect() {
   };
   socket.onclose = () => {
     enable(false);
-    if (frame?.run.state === "finished") return;
+    if (frame?.run.state === "finished") return setTimeout(connect, 5000);
     $("state").dataset.state = "offline";
     text("state", "offline");
     setTimeout(connect, 2000);

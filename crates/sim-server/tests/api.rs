@@ -1,0 +1,152 @@
+//! The HTTP API as a client meets it: answers and refusals are JSON, in the API's own words.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "the test is a client of another process"
+)]
+
+mod support;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Stdio};
+use std::time::Duration;
+
+use serde_json::Value;
+use support::program;
+
+/// A run with a dashboard on a free port.
+struct Run {
+    process: Child,
+    address: String,
+    _folder: tempfile::TempDir,
+}
+
+impl Run {
+    fn start(options: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let mut process = program()
+            .args(["run", "flat", "--port", "0", "--keep-open", "--out"])
+            .arg(folder.path().join("out"))
+            .args(options)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(process.stderr.take().unwrap()).read_line(&mut line).unwrap();
+        let address = line.split("http://").nth(1).unwrap_or_else(|| panic!("{line}"));
+        let address = address.split_whitespace().next().unwrap().to_owned();
+        Self { process, address, _folder: folder }
+    }
+
+    /// Status and body of a request.
+    fn ask(&self, method: &str, path: &str, more_headers: &str, body: &[u8]) -> (u16, Value) {
+        let mut stream = TcpStream::connect(&self.address).unwrap();
+        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+        let host = if more_headers.contains("Host:") {
+            String::new()
+        } else {
+            format!("Host: {}\r\n", self.address)
+        };
+        let length = if more_headers.contains("Content-Length:") {
+            String::new()
+        } else {
+            format!("Content-Length: {}\r\n", body.len())
+        };
+        let head = format!(
+            "{method} {path} HTTP/1.1\r\n{host}{more_headers}{length}Connection: close\r\n\r\n"
+        );
+        stream.write_all(&[head.as_bytes(), body].concat()).unwrap();
+        let mut answer = String::new();
+        stream.read_to_string(&mut answer).unwrap();
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap_or_else(|| panic!("{answer}"));
+        let status = head.split_whitespace().nth(1).unwrap().parse().unwrap();
+        assert!(head.to_ascii_lowercase().contains("content-type: application/json"), "{head}");
+        (status, serde_json::from_str(body).unwrap())
+    }
+
+    fn control(&self, body: &str) -> (u16, Value) {
+        self.ask("POST", "/api/v1/control", "", body.as_bytes())
+    }
+
+    /// The frame, once there is one.
+    fn state(&self) -> Value {
+        for _ in 0..600 {
+            let (status, state) = self.ask("GET", "/api/v1/state", "", b"");
+            if status == 200 {
+                return state;
+            }
+            assert_eq!(state["code"], "no_tick_yet");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+        panic!("no frame")
+    }
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+fn refused(answer: &(u16, Value), status: u16, code: &str, words: &str) {
+    let (got, body) = answer;
+    assert_eq!((*got, &body["code"], &body["schema"]), (status, &code.into(), &1.into()), "{body}");
+    assert!(body["error"].as_str().unwrap().contains(words), "{body}");
+}
+
+#[test]
+fn refusals_are_json_with_a_code_and_words_of_the_api() {
+    let run = Run::start(&[]);
+    refused(&run.control("nonsense"), 400, "not_an_object", "JSON object");
+    refused(&run.control(r#"{"action": "fly"}"#), 400, "unknown_action", "fly");
+    refused(&run.control(r#"{"action": "step"}"#), 400, "missing_key", "ticks");
+    refused(&run.control(r#"{"action": "pace", "pace": -1}"#), 400, "wrong_value", "pace = -1");
+    refused(&run.ask("POST", "/api/v1/control", "", b"\xff\xfe"), 400, "not_an_object", "JSON");
+    refused(&run.ask("GET", "/api/v1/nothing", "", b""), 404, "not_found", "/api/v1/nothing");
+    refused(&run.ask("GET", "/api/v1/control", "", b""), 405, "method_not_allowed", "GET");
+    let evil = "Host: evil.example\r\n";
+    refused(&run.ask("GET", "/api/v1/state", evil, b""), 403, "foreign_page", "this server");
+    let long = "Content-Length: 9000000\r\n";
+    refused(&run.ask("POST", "/api/v1/control", long, b""), 413, "body_not_read", "too long");
+}
+
+/// A pace of 5 was refused, only "5" was taken.
+#[test]
+fn a_pace_is_a_number_or_a_word() {
+    let run = Run::start(&[]);
+    for (pace, shown) in [("5", "5"), ("\"7\"", "7"), ("\"realtime\"", "realtime")] {
+        let answer = run.control(&format!("{{\"action\": \"pace\", \"pace\": {pace}}}"));
+        assert_eq!(answer.0, 202, "{}", answer.1);
+        let taken = (0..300).any(|_| {
+            std::thread::sleep(Duration::from_millis(50));
+            run.state()["run"]["pace"] == shown
+        });
+        assert!(taken, "{pace}");
+    }
+}
+
+/// A wish for a lane change was answered with 202 and dropped where nobody takes wishes.
+#[test]
+fn a_lane_change_is_taken_only_where_the_decider_is_external() {
+    let wish = r#"{"action": "lane_change", "to": "left"}"#;
+    refused(&Run::start(&[]).control(wish), 409, "no_external_decider", "--decider external");
+    assert_eq!(Run::start(&["--decider", "external"]).control(wish).0, 202);
+}
+
+/// A page that stays open must see that another run has taken the port.
+#[test]
+fn each_run_has_an_id_of_its_own() {
+    let (a, b) = (Run::start(&[]), Run::start(&[]));
+    let id = |run: &Run| run.state()["run_id"].as_str().unwrap().to_owned();
+    let (first, other) = (id(&a), id(&b));
+    assert!(!first.is_empty() && first != other);
+    assert_eq!(id(&a), first);
+    a.control(r#"{"action": "pace", "pace": "max"}"#);
+    let (_, summary) = a.ask("GET", "/api/v1/summary", "", b"");
+    assert_eq!(summary["schema"], 1);
+}
