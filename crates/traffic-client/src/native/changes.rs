@@ -35,6 +35,13 @@ struct Need {
     distance_m: f64,
 }
 
+/// A driver and the changes that would pay or are needed: side, lane, incentive, m/s².
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wish {
+    i: usize,
+    options: [Option<(usize, u16, f64)>; 2],
+}
+
 impl Engine {
     /// The lane change that vehicle `i` has to make, if any.
     fn need(&self, i: usize) -> Option<Need> {
@@ -79,8 +86,9 @@ impl Engine {
         now.min(1.0 - desire * (1.0 - self.least_frac(i)))
     }
 
-    /// Vehicles that have to change adapt to their new leader; their new follower lets them in.
-    pub(super) fn make_room(&mut self, i: usize) {
+    /// A vehicle that has to change adapts to its new leader, and its new follower lets it in:
+    /// accelerations that they do not exceed, m/s².
+    pub(super) fn make_room(&self, i: usize, bounds: &mut Vec<(usize, f64)>) {
         let fleet = &self.state.fleet;
         if fleet.is_changing(i) {
             return;
@@ -95,36 +103,49 @@ impl Engine {
             return;
         }
         let comfortable = fleet.driver[i].idm.decel_m_s2;
-        let taken = self.behind_at_m_s2(
-            i,
-            self.near.leader[i][need.side],
-            lane,
-            self.content_frac(i, desire),
-        );
+        let leader = self.near.leader[i][need.side];
+        let taken = self.behind_at_m_s2(i, leader, lane, self.content_frac(i, desire));
         let own = fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, fleet.lane[i]), taken);
+        bounds.push((i, own.max(-comfortable)));
         let follower = self.near.follower[i][need.side];
-        self.raw_a_m_s2[i] = self.raw_a_m_s2[i].min(own.max(-comfortable));
         if follower < EGO {
             let f = follower as usize;
             let yields = self.in_lane_m_s2(f, i as u32, lane, self.content_frac(f, desire));
-            let bounded = yields.max(-self.config.yield_decel_m_s2);
-            self.raw_a_m_s2[f] = self.raw_a_m_s2[f].min(bounded);
+            bounds.push((f, yields.max(-self.config.yield_decel_m_s2)));
         }
     }
 
-    pub(super) fn change_lanes(&mut self) {
+    /// What driver `i` would do about his lane in this tick.
+    pub(super) fn wish(&self, i: usize) -> Option<Wish> {
+        let fleet = &self.state.fleet;
+        if !is_due(self.state.tick, fleet.id[i]) || fleet.is_changing(i) || fleet.clock_s[i] < 0.0 {
+            return None;
+        }
+        let options = match self.need(i) {
+            Some(need) => {
+                let possible = self.change_m_s2(i, need.side, Some(self.desire(&need)));
+                [possible.map(|(lane, _)| (need.side, lane, f64::INFINITY)), None]
+            }
+            None => [LEFT, RIGHT].map(|side| {
+                let possible = self.change_m_s2(i, side, None).filter(|&(_, gain)| gain > 0.0);
+                possible.map(|(lane, gain)| (side, lane, gain))
+            }),
+        };
+        options.iter().any(Option::is_some).then_some(Wish { i, options })
+    }
+
+    /// Begins changes, from the front, each that is far enough from those begun in this tick.
+    pub(super) fn change_lanes(&mut self, wishes: impl Iterator<Item = Wish>) {
         self.begun_m.clear();
         self.begun_m.resize(self.map.lanes.len(), f64::INFINITY);
-        for i in (0..self.state.fleet.len()).rev() {
-            let fleet = &self.state.fleet;
-            if !is_due(self.state.tick, fleet.id[i])
-                || fleet.is_changing(i)
-                || fleet.clock_s[i] < 0.0
-            {
-                continue;
-            }
-            if let Some((side, lane)) = self.best_change(i) {
-                self.begin(i, side, lane);
+        for wish in wishes {
+            let s_m = self.state.fleet.s_m[wish.i];
+            let apart = |o: &&(usize, u16, f64)| self.begun_m[o.1 as usize] - s_m >= APART_M;
+            let possible = wish.options.iter().flatten().filter(apart);
+            // Of two that pay as much, the left one.
+            let best = possible.reduce(|a, b| if b.2 > a.2 { b } else { a }).copied();
+            if let Some((side, lane, _)) = best {
+                self.begin(wish.i, side, lane);
             }
         }
     }
@@ -170,23 +191,6 @@ impl Engine {
         }
     }
 
-    /// Side and lane to change to now: the needed one if it is safe, else the one that pays most.
-    fn best_change(&self, i: usize) -> Option<(usize, u16)> {
-        if let Some(need) = self.need(i) {
-            let desire = Some(self.desire(&need));
-            return self.change_m_s2(i, need.side, desire).map(|(lane, _)| (need.side, lane));
-        }
-        let mut best: Option<(usize, u16, f64)> = None;
-        for side in [LEFT, RIGHT] {
-            if let Some((lane, gain)) = self.change_m_s2(i, side, None)
-                && gain > best.map_or(0.0, |b| b.2)
-            {
-                best = Some((side, lane, gain));
-            }
-        }
-        best.map(|b| (b.0, b.1))
-    }
-
     /// MOBIL for one side: lane and incentive, m/s², if the change is possible and safe.
     fn change_m_s2(&self, i: usize, side: usize, desire: Option<f64>) -> Option<(u16, f64)> {
         let fleet = &self.state.fleet;
@@ -199,9 +203,6 @@ impl Engine {
             && self.map.ends_early(lane)
             && to.s_end_m - s < self.config.mandatory_ahead_m
         {
-            return None;
-        }
-        if self.begun_m[lane as usize] - s < APART_M {
             return None;
         }
         let (leader, follower) = (self.near.leader[i][side], self.near.follower[i][side]);

@@ -3,7 +3,8 @@
 //! A tick is [`TICK_S`]. [`Engine::decide`] fixes every acceleration at the start of a tick from
 //! the positions at that instant; [`Engine::commit`] moves the vehicles to its end. Between the
 //! two, a vehicle's position at any instant is known in closed form. Only IEEE-exact operations
-//! (`+ - * /`, comparison) touch the state, so the same seed gives the same bits on every machine.
+//! (`+ - * /`, comparison) and `libm` touch the state, so the same seed gives the same bits on every
+//! machine. Sweeps over the fleet are done in pieces ([`super::workers`]).
 
 use std::sync::Arc;
 
@@ -12,11 +13,13 @@ use driver_models::{Idm, ballistic};
 use super::boundary::Boundary;
 use super::changes::{DECISION_TICKS, is_due};
 use super::config::{ClassConfig, TrafficConfig};
+use super::driver::Driver;
 use super::ego::EgoSpans;
 use super::fleet::Fleet;
 use super::human::Minds;
 use super::lanes::{LaneMap, NO_LANE};
-use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT};
+use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT, Seen};
+use super::workers::{InTurn, PIECE, Workers, in_pieces};
 
 /// Length of a tick, s.
 pub(crate) const TICK_S: f64 = 0.1;
@@ -91,6 +94,23 @@ pub(crate) struct Engine {
     /// How other drivers expect the ego to follow.
     pub(super) ego_driver: Idm,
     pub(super) minds: Minds,
+    /// Who does the pieces of a tick, and how many vehicles a piece has.
+    pub(super) workers: Arc<dyn Workers>,
+    pub(super) piece: usize,
+}
+
+/// What moving a piece gave.
+#[derive(Debug, Clone, Copy, Default)]
+struct Moved {
+    driven_m: f64,
+    somebody_leaves: bool,
+}
+
+/// Has the vehicle left the road?
+fn is_out(map: &LaneMap, s_m: f64, lane: u16, driver: &Driver) -> bool {
+    let lane = &map.lanes[lane as usize];
+    let left_road = s_m - driver.length_m > map.s_end_m || s_m > driver.leaves_s_m;
+    left_road || lane.leaves && s_m > lane.s_end_m
 }
 
 impl Engine {
@@ -107,6 +127,8 @@ impl Engine {
             begun_m: Vec::new(),
             beyond_m_s: Vec::new(),
             boundary: None,
+            workers: Arc::new(InTurn),
+            piece: PIECE,
             ego_driver: Idm::new(25.0, 1.5, 3.0, 0.6, 1.5, 6.0),
         }
     }
@@ -114,46 +136,57 @@ impl Engine {
     /// Fixes the accelerations and begins lane changes; the ego spans are those of this instant.
     pub(crate) fn decide(&mut self) {
         self.look_beyond();
-        self.judge();
-        let (fleet, map, tick) = (&self.state.fleet, &self.map, self.state.tick);
-        self.near.find(fleet, map, &self.ego, |i| {
+        let workers = Arc::clone(&self.workers);
+        let piece = self.piece;
+        self.find_neighbours(&*workers, piece);
+        let mut raw = std::mem::take(&mut self.raw_a_m_s2);
+        raw.resize(self.state.fleet.len(), 0.0);
+        let all_bounds = in_pieces(&*workers, raw.chunks_mut(piece), |k, raw| {
+            let mut bounds = Vec::new();
+            for (i, a) in (k * piece..).zip(raw) {
+                *a = self.follow_m_s2(i);
+                self.make_room(i, &mut bounds);
+            }
+            bounds
+        });
+        for (i, most_m_s2) in all_bounds.into_iter().flatten() {
+            raw[i] = raw[i].min(most_m_s2);
+        }
+        self.raw_a_m_s2 = raw;
+        let mut a_m_s2 = std::mem::take(&mut self.state.fleet.a_m_s2);
+        let wishes = in_pieces(&*workers, a_m_s2.chunks_mut(piece), |k, a_m_s2| {
+            let range = k * piece..k * piece + a_m_s2.len();
+            for (i, a) in range.clone().zip(a_m_s2) {
+                *a = self.possible_m_s2(i);
+            }
+            range.rev().filter_map(|i| self.wish(i)).collect::<Vec<_>>()
+        });
+        self.state.fleet.a_m_s2 = a_m_s2;
+        self.change_lanes(wishes.into_iter().rev().flatten());
+    }
+
+    fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize) {
+        let (fleet, map, tick) = (&self.state.fleet, &*self.map, self.state.tick);
+        let looks_aside = |i: usize| {
             is_due(tick, fleet.id[i])
                 || fleet.is_changing(i)
                 || fleet.driver[i].exit != NO_LANE
                 || map.ends_early(fleet.lane[i])
-        });
-        let n = fleet.len();
-        self.raw_a_m_s2.clear();
-        for i in 0..n {
-            let a = self.follow_m_s2(i);
-            self.raw_a_m_s2.push(a);
-        }
-        for i in 0..n {
-            self.make_room(i);
-        }
-        self.change_lanes();
-        for i in 0..n {
-            let fleet = &self.state.fleet;
-            let (driver, class) = (&fleet.driver[i], self.class(i));
-            let power = driver.power_limit_m_s2(
-                fleet.v_m_s[i],
-                self.map.sin_grade(fleet.s_m[i]),
-                class.rolling_coeff,
-                class.drag_1_m,
-            );
-            let a = self.raw_a_m_s2[i].min(power).max(-driver.idm.max_decel_m_s2);
-            self.state.fleet.a_m_s2[i] = a;
-        }
+        };
+        self.near.find(Seen { fleet, map, ego: &self.ego }, workers, piece, looks_aside);
     }
 
-    /// Drivers who think about their lane judge gaps and speeds anew.
-    fn judge(&mut self) {
-        let (tick, fleet) = (self.state.tick, &mut self.state.fleet);
-        for (mind, &id) in fleet.mind.iter_mut().zip(&fleet.id) {
-            if is_due(tick, id) {
-                self.minds.judge(mind, id, tick);
-            }
-        }
+    /// The wanted acceleration as far as engine and tyres give it, m/s².
+    fn possible_m_s2(&self, i: usize) -> f64 {
+        let fleet = &self.state.fleet;
+        let (driver, class) = (&fleet.driver[i], self.class(i));
+        let power = driver.power_limit_m_s2(
+            fleet.v_m_s[i],
+            self.map.sin_grade(fleet.s_m[i]),
+            class.rolling_coeff,
+            class.drag_1_m,
+        );
+        self.raw_a_m_s2[i].min(power).max(-driver.idm.max_decel_m_s2)
     }
 
     pub(super) fn class(&self, i: usize) -> &ClassConfig {
@@ -241,35 +274,60 @@ impl Engine {
 
     /// Moves every vehicle to the end of the tick, then lets vehicles out and in.
     pub(crate) fn commit(&mut self) {
-        let state = &mut self.state;
-        let fleet = &mut state.fleet;
-        for i in 0..fleet.len() {
-            let (v, distance) = ballistic(fleet.v_m_s[i], fleet.a_m_s2[i], TICK_S);
-            fleet.v_m_s[i] = v;
-            fleet.s_m[i] += distance;
-            state.driven_m += distance;
-            self.minds.relax(&mut fleet.mind[i]);
-            fleet.clock_s[i] += TICK_S;
-            if fleet.target[i] == NO_LANE {
-                fleet.clock_s[i] = fleet.clock_s[i].min(0.0);
-            } else if fleet.clock_s[i] >= fleet.driver[i].lane_change_s {
-                fleet.lane[i] = fleet.target[i];
-                fleet.target[i] = NO_LANE;
-                fleet.clock_s[i] = -REST_S;
-            }
-        }
-        state.tick += 1;
-        let map = &self.map;
+        let moved = self.move_all();
+        self.state.driven_m += moved.iter().map(|m| m.driven_m).sum::<f64>();
+        self.state.tick += 1;
+        let fleet = &mut self.state.fleet;
         fleet.sort();
-        fleet.retain(|f, i| {
-            let lane = &map.lanes[f.lane[i] as usize];
-            let left_road = f.rear_m(i) > map.s_end_m || f.s_m[i] > f.driver[i].leaves_s_m;
-            !(left_road || lane.leaves && f.s_m[i] > lane.s_end_m)
-        });
+        if moved.iter().any(|m| m.somebody_leaves) {
+            let map = &self.map;
+            fleet.retain(|f, i| !is_out(map, f.s_m[i], f.lane[i], &f.driver[i]));
+        }
         match self.boundary.clone() {
             Some(boundary) => self.let_in_measured(&boundary),
             None => self.let_in(),
         }
+    }
+
+    /// Moves every vehicle and lets every driver get used to things and judge anew.
+    fn move_all(&mut self) -> Vec<Moved> {
+        let (map, minds, tick) = (&*self.map, self.minds, self.state.tick + 1);
+        let (fleet, piece) = (&mut self.state.fleet, self.piece);
+        let motion = fleet.s_m.chunks_mut(piece).zip(fleet.v_m_s.chunks_mut(piece));
+        let change = fleet.lane.chunks_mut(piece).zip(fleet.target.chunks_mut(piece));
+        let inside = fleet.clock_s.chunks_mut(piece).zip(fleet.mind.chunks_mut(piece));
+        let fixed = fleet.driver.chunks(piece).zip(fleet.id.chunks(piece));
+        let items = motion.zip(change).zip(inside).zip(fixed.zip(fleet.a_m_s2.chunks(piece)));
+        in_pieces(&*self.workers, items, |_, (((motion, change), inside), (fixed, a_m_s2))| {
+            let ((s_m, v_m_s), (lane, target), (clock_s, mind)) = (motion, change, inside);
+            let (driver, id) = fixed;
+            let mut moved = Moved::default();
+            for i in 0..s_m.len() {
+                let (v, distance_m) = ballistic(v_m_s[i], a_m_s2[i], TICK_S);
+                v_m_s[i] = v;
+                s_m[i] += distance_m;
+                moved.driven_m += distance_m;
+                clock_s[i] += TICK_S;
+                if target[i] == NO_LANE {
+                    clock_s[i] = clock_s[i].min(0.0);
+                } else if clock_s[i] >= driver[i].lane_change_s {
+                    lane[i] = target[i];
+                    target[i] = NO_LANE;
+                    clock_s[i] = -REST_S;
+                }
+                minds.relax(&mut mind[i]);
+                if is_due(tick, id[i]) {
+                    minds.judge(&mut mind[i], id[i], tick);
+                }
+                moved.somebody_leaves |= is_out(map, s_m[i], lane[i], &driver[i]);
+            }
+            moved
+        })
+    }
+
+    /// Memory of a vehicle, bytes: state, acceleration before lane changes, neighbours.
+    pub(crate) fn bytes_per_vehicle() -> usize {
+        Fleet::BYTES + size_of::<f64>() + 3 * size_of::<u16>() + 6 * size_of::<u32>()
     }
 
     /// Smallest bumper-to-bumper gap to a leader in any lane that a vehicle takes up, m; call it

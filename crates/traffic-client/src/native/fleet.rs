@@ -52,6 +52,13 @@ impl Clone for Fleet {
 }
 
 impl Fleet {
+    /// Memory of a vehicle, bytes.
+    pub(crate) const BYTES: usize = 4 * size_of::<f64>()
+        + 2 * size_of::<u16>()
+        + size_of::<u64>()
+        + size_of::<Driver>()
+        + size_of::<Mind>();
+
     pub(crate) fn len(&self) -> usize {
         self.s_m.len()
     }

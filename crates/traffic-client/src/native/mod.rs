@@ -17,6 +17,7 @@ mod publish;
 mod rim;
 mod source;
 mod takeover;
+mod workers;
 
 pub use boundary::Boundary;
 pub use config::{ClassConfig, Density, FAMILY_MAX_SPEEDS_M_S, TrafficConfig};
@@ -27,8 +28,11 @@ pub use human::HumanConfig;
 pub(crate) use lanes::LaneMap;
 pub(crate) use publish::carry_on;
 pub use source::{NativeCounts, NativeSnapshot, NativeTraffic};
+pub use workers::{InTurn, Piece, Workers};
 
 #[cfg(test)]
 mod population_tests;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod workers_tests;

@@ -1,9 +1,12 @@
 //! Who is ahead and who is behind, in the own lane and in both neighbour lanes: two sweeps over
 //! the sorted fleet, each vehicle touched once.
 
+use std::ops::Range;
+
 use super::ego::EgoSpans;
 use super::fleet::Fleet;
 use super::lanes::{LaneMap, NO_LANE};
+use super::workers::{Workers, in_pieces, ranges};
 
 /// Own lane, left lane, right lane.
 pub(crate) const OWN: usize = 0;
@@ -24,72 +27,139 @@ pub(crate) struct Neighbourhood {
     pub(crate) leader: Vec<[u32; 3]>,
     /// Nearest vehicle whose front is behind.
     pub(crate) follower: Vec<[u32; 3]>,
-    nearest: Vec<u32>,
+}
+
+/// What a sweep goes over.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub(super) fleet: &'a Fleet,
+    pub(super) map: &'a LaneMap,
+    pub(super) ego: &'a EgoSpans,
 }
 
 impl Neighbourhood {
     /// Finds the neighbours in the own lane, and in the lanes beside of those who `look_aside`
-    /// (the others get [`NO_LANE`] there); the fleet is sorted.
-    pub(crate) fn find(
+    /// (the others get [`NO_LANE`] there); the fleet is sorted. Of more than one piece, each first
+    /// tells who is nearest to its ends, so that the sweep over the next one can begin with them.
+    pub(super) fn find(
         &mut self,
-        fleet: &Fleet,
-        map: &LaneMap,
-        ego: &EgoSpans,
-        look_aside: impl Fn(usize) -> bool,
+        seen: Seen<'_>,
+        workers: &dyn Workers,
+        piece: usize,
+        look_aside: impl Fn(usize) -> bool + Sync,
     ) {
-        let n = fleet.len();
+        let n = seen.fleet.len();
         self.lanes.resize(n, [NO_LANE; 3]);
         self.leader.resize(n, [NOBODY; 3]);
         self.follower.resize(n, [NOBODY; 3]);
-        for i in 0..n {
-            let lane = fleet.lane[i];
-            let aside = look_aside(i);
-            let (left, right) =
-                if aside { map.beside(lane, fleet.s_m[i]) } else { (NO_LANE, NO_LANE) };
-            self.lanes[i] = [lane, left, right];
+        // NO_LANE looks at the spare last entry, which stays NOBODY.
+        let nobody = vec![NOBODY; seen.map.lanes.len() + 1];
+        let mut ends = Vec::new();
+        if n > piece {
+            ends = in_pieces(workers, ranges(n, piece), |_, range| {
+                let (mut ahead, mut behind) = (nobody.clone(), nobody.clone());
+                seen.from_the_front(range.clone(), &mut ahead, |_, _| {});
+                seen.from_the_back(range, &mut behind, |_, _| {});
+                (ahead, behind)
+            });
         }
-        // From the front: the last one seen in a lane is the leader of the next one.
-        self.reset(map.lanes.len());
-        let mut spans = ego.spans().iter().rev().peekable();
-        for i in (0..n).rev() {
-            while let Some(span) = spans.next_if(|e| e.front_m > fleet.s_m[i]) {
-                self.nearest[span.lane as usize] = EGO;
+        let pieces = n.div_ceil(piece);
+        let (mut ahead, mut behind) = (vec![nobody.clone(); pieces], vec![nobody; pieces]);
+        for k in (1..pieces).rev() {
+            ahead[k - 1] = nearer(&ahead[k], &ends[k].0);
+        }
+        for k in 1..pieces {
+            behind[k] = nearer(&behind[k - 1], &ends[k - 1].1);
+        }
+        let lanes = self.lanes.chunks_mut(piece);
+        let found = self.leader.chunks_mut(piece).zip(self.follower.chunks_mut(piece));
+        let items = lanes.zip(found).zip(ahead.into_iter().zip(behind));
+        in_pieces(workers, items, |k, ((lanes, (leader, follower)), (mut ahead, mut behind))| {
+            let from = k * piece;
+            let range = from..from + lanes.len();
+            for (i, lanes) in range.clone().zip(lanes.iter_mut()) {
+                let lane = seen.fleet.lane[i];
+                let (left, right) = if look_aside(i) {
+                    seen.map.beside(lane, seen.fleet.s_m[i])
+                } else {
+                    (NO_LANE, NO_LANE)
+                };
+                *lanes = [lane, left, right];
             }
-            self.leader[i] = self.look(i);
-            self.mark(fleet, i);
+            // From the front: the last one seen in a lane is the leader of the next one.
+            seen.from_the_front(range.clone(), &mut ahead, |i, nearest| {
+                leader[i - from] = look(lanes[i - from], nearest);
+            });
+            seen.from_the_back(range, &mut behind, |i, nearest| {
+                follower[i - from] = look(lanes[i - from], nearest);
+            });
+        });
+    }
+}
+
+/// The nearest of two that are known, where those of `near` are nearer.
+fn nearer(far: &[u32], near: &[u32]) -> Vec<u32> {
+    far.iter().zip(near).map(|(&f, &n)| if n == NOBODY { f } else { n }).collect()
+}
+
+fn look([own, left, right]: [u16; 3], nearest: &[u32]) -> [u32; 3] {
+    let spare = nearest.len() - 1;
+    let own = nearest[own as usize];
+    if left == NO_LANE && right == NO_LANE {
+        return [own, NOBODY, NOBODY];
+    }
+    let at = |lane: u16| nearest[(lane as usize).min(spare)];
+    [own, at(left), at(right)]
+}
+
+impl Seen<'_> {
+    /// Visits a range from its front, with the nearest one ahead in each lane; `nearest` begins with
+    /// those ahead of the range.
+    fn from_the_front(
+        &self,
+        range: Range<usize>,
+        nearest: &mut [u32],
+        mut visit: impl FnMut(usize, &[u32]),
+    ) {
+        let s_m = &self.fleet.s_m;
+        let mut spans = self.ego.spans().iter().rev().peekable();
+        if let Some(&next_m) = s_m.get(range.end) {
+            while spans.next_if(|e| e.front_m > next_m).is_some() {}
         }
-        self.reset(map.lanes.len());
-        let mut spans = ego.spans().iter().peekable();
-        for i in 0..n {
-            while let Some(span) = spans.next_if(|e| e.front_m <= fleet.s_m[i]) {
-                self.nearest[span.lane as usize] = EGO;
+        for i in range.rev() {
+            while let Some(span) = spans.next_if(|e| e.front_m > s_m[i]) {
+                nearest[span.lane as usize] = EGO;
             }
-            self.follower[i] = self.look(i);
-            self.mark(fleet, i);
+            visit(i, nearest);
+            self.mark(i, nearest);
         }
     }
 
-    fn reset(&mut self, lanes: usize) {
-        self.nearest.clear();
-        self.nearest.resize(lanes + 1, NOBODY);
-    }
-
-    fn look(&self, i: usize) -> [u32; 3] {
-        // NO_LANE maps to the spare last entry, which stays NOBODY.
-        let spare = self.nearest.len() - 1;
-        let [own, left, right] = self.lanes[i];
-        let own = self.nearest[own as usize];
-        if left == NO_LANE && right == NO_LANE {
-            return [own, NOBODY, NOBODY];
+    /// The same from its back.
+    fn from_the_back(
+        &self,
+        range: Range<usize>,
+        nearest: &mut [u32],
+        mut visit: impl FnMut(usize, &[u32]),
+    ) {
+        let s_m = &self.fleet.s_m;
+        let mut spans = self.ego.spans().iter().peekable();
+        if let Some(&last_m) = range.start.checked_sub(1).and_then(|k| s_m.get(k)) {
+            while spans.next_if(|e| e.front_m <= last_m).is_some() {}
         }
-        let at = |lane: u16| self.nearest[(lane as usize).min(spare)];
-        [own, at(left), at(right)]
+        for i in range {
+            while let Some(span) = spans.next_if(|e| e.front_m <= s_m[i]) {
+                nearest[span.lane as usize] = EGO;
+            }
+            visit(i, nearest);
+            self.mark(i, nearest);
+        }
     }
 
-    fn mark(&mut self, fleet: &Fleet, i: usize) {
-        self.nearest[fleet.lane[i] as usize] = i as u32;
-        if fleet.is_changing(i) {
-            self.nearest[fleet.target[i] as usize] = i as u32;
+    fn mark(&self, i: usize, nearest: &mut [u32]) {
+        nearest[self.fleet.lane[i] as usize] = i as u32;
+        if self.fleet.is_changing(i) {
+            nearest[self.fleet.target[i] as usize] = i as u32;
         }
     }
 }

@@ -9,6 +9,7 @@ use super::boundary::Boundary;
 use super::config::TrafficConfig;
 use super::engine::{Engine, State, TICK_S};
 use super::publish::publish;
+use super::workers::Workers;
 use crate::TrafficError;
 
 /// Length of a tick, ns.
@@ -111,6 +112,17 @@ impl NativeTraffic {
         let mut traffic = Self::new(road, geometry, TrafficConfig { warm_up_s: 0.0, ..config })?;
         traffic.engine.bound(boundary);
         Ok(traffic)
+    }
+
+    /// Lets others do the work from now on: the bits stay the same.
+    pub fn set_workers(&mut self, workers: Arc<dyn Workers>) {
+        self.engine.workers = workers;
+    }
+
+    /// Memory of a vehicle, bytes: its state and what is worked out about it in a tick.
+    #[must_use]
+    pub fn bytes_per_vehicle() -> usize {
+        Engine::bytes_per_vehicle()
     }
 
     /// The configuration.
