@@ -1,94 +1,161 @@
-//! Calibrates drivers to all but one recording and judges them on that one, for each in turn.
+//! Calibrates one population to a part of the recordings and judges it on the others, then the
+//! other way round: every recording is judged by drivers who were found without it.
 //!
-//! `cross_validate GENERATIONS LANES FILES...` prints a line per recording left out: the
-//! Kolmogorov-Smirnov distances of speed, gap and acceleration with the measured start and arrivals
-//! (`bounded`), that of the speeds if everyone kept the speed that they came with (`kept`), those of
-//! speed and gap with flow, density and speeds at both ends of the others only (`free`; mean, and
-//! range, of eight seeds), that of the training recordings
-//! themselves (`others`), and lane changes per vehicle-km.
+//! `cross_validate GENERATIONS PARTS FILE:LANES...` deals the files out to so many parts in turn
+//! (1: learn from all, and judge on the same) and prints a line per recording: Kolmogorov-Smirnov
+//! distances of speed and gap with the measured start and arrivals (`bounded`), that of the speeds
+//! if everyone kept the speed that they came with (`kept`), those of speed and gap with flow and
+//! speeds at both ends only (`free`; mean and range of eight seeds), and the mean distance of the
+//! speeds from the other recordings of its name up to the first digit (`others`).
 #![allow(clippy::disallowed_macros, reason = "a measurement program")]
 
 use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 
-use traffic_client::calibrate::{Effort, Lesson, calibrate, drive, drive_bounded};
+use road::Road;
+use traffic_client::calibrate::{Calibration, Effort, Lesson, calibrate, drive, drive_bounded};
 use traffic_client::native::{Boundary, TrafficConfig};
-use traffic_client::replay::{Carriageway, Frame, load, road_of};
+use traffic_client::replay::{Carriageway, Frame, Recording, load, road_of};
 use traffic_client::stats::{Quantity, Samples, kolmogorov_smirnov, observe_recording};
 
 /// Free traffic is driven with these seeds, none of which the search used, each for this long, s.
 const FREE_SEEDS: std::ops::RangeInclusive<u64> = 1..=8;
-const FREE_S: f64 = 300.0;
+const FREE_S: f64 = 30.0;
+/// Drives of bounded traffic.
+const BOUNDED_DRIVES: u64 = 4;
 
-/// Mean, smallest and largest.
-fn spread(values: &[f64]) -> (f64, f64, f64) {
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let least = values.iter().copied().fold(f64::INFINITY, f64::min);
-    (mean, least, values.iter().copied().fold(f64::NEG_INFINITY, f64::max))
+/// A recording on its road, looked at.
+struct Looked {
+    name: String,
+    recording: Recording,
+    road: Arc<Road>,
+    samples: Samples,
+}
+
+impl Looked {
+    fn at(file: &str) -> Result<Self, Box<dyn Error>> {
+        let (path, lanes) = file.rsplit_once(':').ok_or("FILE:LANES")?;
+        let mut recording = load(Path::new(path), Carriageway::Forward, 0.1)?;
+        recording.frame = Frame::Map;
+        let road = Arc::new(road_of(&recording, lanes.parse()?, 60.0)?);
+        let mut samples = observe_recording(&road, &recording)?;
+        samples.replace(Quantity::Speed, recording.speeds_m_s().collect());
+        let name = Path::new(path).file_name().map(|n| n.to_string_lossy().into_owned());
+        Ok(Self { name: name.unwrap_or_default(), recording, road, samples })
+    }
+
+    fn lesson(&self) -> Lesson<'_> {
+        Lesson { recording: &self.recording, road: &self.road, samples: &self.samples }
+    }
+
+    /// The name up to its first digit: recordings of one kind.
+    fn kind(&self) -> &str {
+        self.name.split(|c: char| c.is_ascii_digit()).next().unwrap_or_default()
+    }
+
+    fn distance(&self, samples: &Samples, quantity: Quantity) -> f64 {
+        kolmogorov_smirnov(samples.of(quantity), self.samples.of(quantity)).unwrap_or(1.0)
+    }
+}
+
+/// Distances of speed and gap in bounded and free traffic, what kept speeds would give, and the
+/// other recordings.
+struct Verdict {
+    bounded: [f64; 2],
+    kept: f64,
+    free: Vec<[f64; 2]>,
+    others: Option<f64>,
+    lane_changes_1_km: [f64; 3],
+}
+
+fn judge(one: &Looked, all: &[Looked], found: &Calibration) -> Result<Verdict, Box<dyn Error>> {
+    // Seeds that the search did not use.
+    let config = TrafficConfig { seed: 1, ..found.config.clone() };
+    let boundary = Arc::new(Boundary::of(&one.road, &one.recording)?);
+    let bounded = drive_bounded(&one.road, &config, &boundary, BOUNDED_DRIVES)?;
+    let free_config = found.free_traffic(&one.lesson())?;
+    let free = FREE_SEEDS
+        .map(|seed| drive(&one.road, TrafficConfig { seed, ..free_config.clone() }, FREE_S))
+        .collect::<Result<Vec<_>, _>>()?;
+    let both = |s: &Samples| [Quantity::Speed, Quantity::Gap].map(|q| one.distance(s, q));
+    let tracks = one.recording.tracks.iter();
+    let kept: Vec<f64> =
+        tracks.flat_map(|t| t.samples.iter().map(|_| t.samples[0].speed_m_s)).collect();
+    let others: Vec<f64> = all
+        .iter()
+        .filter(|o| o.kind() == one.kind() && o.name != one.name)
+        .map(|o| one.distance(&o.samples, Quantity::Speed))
+        .collect();
+    let free_changes = free.iter().map(Samples::lane_changes_1_km).sum::<f64>();
+    Ok(Verdict {
+        bounded: both(&bounded),
+        kept: kolmogorov_smirnov(&kept, one.samples.of(Quantity::Speed)).unwrap_or(1.0),
+        free: free.iter().map(both).collect(),
+        others: (!others.is_empty()).then(|| others.iter().sum::<f64>() / others.len() as f64),
+        lane_changes_1_km: [
+            one.samples.lane_changes_1_km(),
+            bounded.lane_changes_1_km(),
+            free_changes / free.len() as f64,
+        ],
+    })
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [generations, lanes, files @ ..] = arguments.as_slice() else {
-        return Err("usage: cross_validate GENERATIONS LANES FILES...".into());
+    let [generations, parts, files @ ..] = arguments.as_slice() else {
+        return Err("usage: cross_validate GENERATIONS PARTS FILE:LANES...".into());
     };
-    let (generations, lanes) = (generations.parse()?, lanes.parse()?);
-    let mut all = Vec::new();
-    for file in files {
-        let mut recording = load(Path::new(file), Carriageway::Forward, 0.1)?;
-        recording.frame = Frame::Map;
-        let road = Arc::new(road_of(&recording, lanes, 60.0)?);
-        let mut samples = observe_recording(&road, &recording)?;
-        samples.replace(Quantity::Speed, recording.speeds_m_s().collect());
-        all.push((recording, road, samples));
-    }
-    for (k, (recording, road, measured)) in all.iter().enumerate() {
-        let others: Vec<_> =
-            all.iter().enumerate().filter(|&(j, _)| j != k).map(|(_, x)| x).collect();
-        let lessons: Vec<Lesson<'_>> = others
-            .iter()
-            .map(|(recording, road, samples)| Lesson { recording, road, samples })
-            .collect();
+    let (generations, parts): (usize, usize) = (generations.parse()?, parts.parse()?);
+    let all = files.iter().map(|f| Looked::at(f)).collect::<Result<Vec<_>, _>>()?;
+    let (mut bounded_met, mut free_met, mut sums) = (0, 0, [0.0; 4]);
+    for part in 0..parts {
+        let is_out = |k: usize| k % parts == part;
+        let learned = all.iter().enumerate().filter(|(k, _)| parts == 1 || !is_out(*k));
+        let lessons: Vec<Lesson<'_>> = learned.map(|(_, l)| l.lesson()).collect();
         let effort = Effort { generations, seed: 1, ..Effort::default() };
         let base = TrafficConfig { seed: 1000, ..TrafficConfig::default() };
         let found = calibrate(&lessons, &base, effort)?;
-        // Seeds that the search did not use.
-        let config = TrafficConfig { seed: 1, ..found.config };
-        let boundary = Arc::new(Boundary::of(road, recording)?);
-        let bounded = drive_bounded(road, &config, &boundary, 4)?;
-        let free = FREE_SEEDS
-            .map(|seed| drive(road, TrafficConfig { seed, ..config.clone() }, FREE_S))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut training = Samples::default();
-        others.iter().for_each(|(_, _, samples)| training.append(samples));
-        let kept: Vec<f64> = recording
-            .tracks
-            .iter()
-            .flat_map(|t| t.samples.iter().map(|_| t.samples[0].speed_m_s))
-            .collect();
-        let ks = |samples: &Samples, quantity| {
-            kolmogorov_smirnov(samples.of(quantity), measured.of(quantity)).unwrap_or(1.0)
-        };
-        let speed = Quantity::Speed;
-        let of_free = |quantity| spread(&free.iter().map(|f| ks(f, quantity)).collect::<Vec<_>>());
-        let (free_speed, least, most) = of_free(speed);
-        let changes: Vec<f64> = free.iter().map(Samples::lane_changes_1_km).collect();
-        println!(
-            "{}: bounded speed {:.3} gap {:.3} accel {:.3}, kept {:.3}, free speed {free_speed:.3} \
-             ({least:.3} to {most:.3}) gap {:.3}, others {:.3}; lane changes {:.2} measured, {:.2} \
-             bounded, {:.2} free",
-            recording.name,
-            ks(&bounded, speed),
-            ks(&bounded, Quantity::Gap),
-            ks(&bounded, Quantity::Accel),
-            kolmogorov_smirnov(&kept, measured.of(speed)).unwrap_or(1.0),
-            of_free(Quantity::Gap).0,
-            ks(&training, speed),
-            measured.lane_changes_1_km(),
-            bounded.lane_changes_1_km(),
-            spread(&changes).0,
-        );
+        println!("part {part}: {} trials, distance {:.3}", found.trials, found.distance);
+        for (key, x, (low, high)) in found.population.iter().chain(&found.free) {
+            println!("  {key} = {x:.3} (searched {low:.3} to {high:.3})");
+        }
+        for (_, one) in all.iter().enumerate().filter(|(k, _)| is_out(*k)) {
+            let v = judge(one, &all, &found)?;
+            let free = |q: usize| v.free.iter().map(|f| f[q]).sum::<f64>() / v.free.len() as f64;
+            let least = v.free.iter().map(|f| f[0]).fold(f64::INFINITY, f64::min);
+            let most = v.free.iter().map(|f| f[0]).fold(0.0, f64::max);
+            println!(
+                "{}: bounded speed {:.3} gap {:.3}, kept {:.3}, free speed {:.3} ({least:.3} to \
+                 {most:.3}) gap {:.3}, others {:.3}; lane changes per km {:.2} measured, {:.2} \
+                 bounded, {:.2} free",
+                one.name,
+                v.bounded[0],
+                v.bounded[1],
+                v.kept,
+                free(0),
+                free(1),
+                v.others.unwrap_or(f64::NAN),
+                v.lane_changes_1_km[0],
+                v.lane_changes_1_km[1],
+                v.lane_changes_1_km[2],
+            );
+            bounded_met += usize::from(v.bounded[0] <= 0.15);
+            free_met += usize::from(free(0) <= 0.15);
+            let others = v.others.unwrap_or(0.0);
+            for (sum, x) in sums.iter_mut().zip([v.bounded[0], v.kept, free(0), others]) {
+                *sum += x / all.len() as f64;
+            }
+        }
     }
+    println!(
+        "within 0.15: bounded {bounded_met}, free {free_met} of {}; means: bounded {:.3}, kept \
+         {:.3}, free {:.3}, others {:.3}",
+        all.len(),
+        sums[0],
+        sums[1],
+        sums[2],
+        sums[3],
+    );
     Ok(())
 }

@@ -1,22 +1,21 @@
-//! Drivers from recordings: parameters of the native engine, so that its traffic has the measured
-//! distributions of speed, gap, headway and acceleration, and the measured rate of lane changes.
+//! Drivers from recordings: one population for all densities, so that the traffic of the native
+//! engine has the measured distributions of speed, gap, headway and acceleration, and the measured
+//! rate of lane changes.
 //!
-//! Two kinds of traffic are driven. *Bounded* traffic begins with the vehicles of a recording and
-//! gets its arrivals and the speed at its end from it ([`Boundary`]). *Free* traffic has the measured
-//! flow, density and classes only, and speeds of the traffic before and beyond the stretch (the
-//! *rim*: where its congestion comes from); it is what a scenario gets. In both, a weighted sum of
-//! Kolmogorov-Smirnov distances is small where traffic looks like the recordings; what counts is the
-//! mean of the distances to each of them, which is how far a further one will be. Differential
-//! evolution searches three times:
-//! 1. the drivers (desired speed, headway, standstill gap, acceleration, braking, MOBIL's
-//!    politeness, threshold and bias), in bounded traffic;
-//! 2. how they follow again (desired speed, headway, gap, acceleration), from there, in free traffic
-//!    with the rim at its measured speeds, as long as the bounded traffic is hardly worse for it:
-//!    what drivers wish for in traffic in which few are hindered shows in free traffic only;
-//! 3. the rim, in free traffic.
+//! Two searches, apart, each by differential evolution:
+//! 1. the *population* (desired speed, headway and how both scatter, standstill gap, acceleration,
+//!    braking, MOBIL's politeness, threshold and bias), in *bounded* traffic: it begins with the
+//!    vehicles of a recording and gets its arrivals and the speed at its end from it ([`Boundary`]);
+//! 2. how the drivers of *free* traffic follow, and its *rim*: it gets flow, density, classes and
+//!    mean and standard deviation of the speeds at both ends of each recording, and four numbers,
+//!    the same for all recordings, say how these become a boundary. Bounded traffic is told where a
+//!    jam is, free traffic has to make it: with one set of drivers for both, both get worse.
 //!
-//! Same recordings, same seed, same result. Left out: differences between classes beyond their share
-//! and length, wishes that change in time.
+//! The measure is the mean over the recordings of a weighted sum of Kolmogorov-Smirnov distances,
+//! each weighing as much as it lasts, and a little for values that no calibration has found before
+//! ([`knobs`]): where recordings say nothing, the usual value stays. Same recordings, same seed,
+//! same result. Left out: differences between classes beyond their share and length, wishes that
+//! change in time.
 
 use std::sync::Arc;
 
@@ -33,7 +32,10 @@ mod knobs;
 
 pub use drives::{drive, drive_bounded, lanes_m};
 
-use knobs::{BOUNDS, DRIVERS, FOLLOWING, Knobs, RIM, guess, turned, with_measured_demand};
+use knobs::{
+    FREE, Knob, POPULATION, bounds, unusual, usual, with_free, with_measured_demand,
+    with_population,
+};
 
 /// Weights of the distances.
 const WEIGHTS: [(Quantity, f64); 4] = [
@@ -43,23 +45,21 @@ const WEIGHTS: [(Quantity, f64); 4] = [
     (Quantity::Accel, 0.1),
 ];
 /// Weight of the rate of lane changes: its difference over its sum, 0 to 1.
-const LANE_CHANGE_WEIGHT: f64 = 0.2;
-/// Drives of the free traffic per trial, each with a seed of its own.
-const DRIVES: u64 = 6;
+const LANE_CHANGE_WEIGHT: f64 = 0.1;
+/// Weight of the mean square of how unusual the values are, in standard deviations.
+const UNUSUAL_WEIGHT: f64 = 0.02;
+/// Drives of each recording's free traffic per trial, each with a seed of its own.
+const FREE_DRIVES: u64 = 3;
 /// Drives of each recording's bounded traffic per trial.
 const BOUNDED_DRIVES: u64 = 2;
-
-/// What the bounded traffic may get worse by while the free traffic gets better; more than this is
-/// paid for with this weight.
-const HARDLY_WORSE: f64 = 0.01;
-const WORSE_WEIGHT: f64 = 5.0;
 
 /// How thoroughly is searched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effort {
-    /// Generations of the search.
+    /// Generations of each of the two searches.
     pub generations: usize,
-    /// Simulated time per drive of the free traffic after its warm-up, s; a trial has six.
+    /// Simulated time per drive of the free traffic after its warm-up, s; a trial has three of each
+    /// recording.
     pub trial_s: f64,
     /// Seed of the search and of its traffic.
     pub seed: u64,
@@ -67,21 +67,39 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self { generations: 25, trial_s: 120.0, seed: 1 }
+        Self { generations: 25, trial_s: 30.0, seed: 1 }
     }
 }
 
 /// A result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// Traffic with the parameters found.
+    /// The given traffic with the population found in bounded traffic.
     pub config: TrafficConfig,
-    /// Weighted distance of the bounded traffic to the recordings, lane changes included.
+    /// Its values, with their keys and the bounds of the search.
+    pub population: Vec<(&'static str, f64, (f64, f64))>,
+    /// Values of the free traffic; those of the rim as parts of the measured ones.
+    pub free: Vec<(&'static str, f64, (f64, f64))>,
+    /// Weighted distance of the bounded traffic to a recording, mean, lane changes included.
     pub distance: f64,
-    /// Weighted distance of the free traffic to a recording, mean of them.
+    /// Weighted distance of the free traffic to its recording, mean.
     pub free_distance: f64,
     /// Trials driven.
     pub trials: usize,
+    values: ([f64; POPULATION.len()], [f64; FREE.len()]),
+}
+
+impl Calibration {
+    /// Free traffic with the measured flow, density, classes and speeds at both ends of a recording,
+    /// which need not be one of those that were learned from.
+    ///
+    /// # Errors
+    /// [`TrafficError`] if the recording does not lie on its road.
+    pub fn free_traffic(&self, lesson: &Lesson<'_>) -> Result<TrafficConfig, TrafficError> {
+        let boundary = Boundary::of(lesson.road, lesson.recording)?;
+        let measured = with_measured_demand(&self.config, lesson, &boundary);
+        Ok(with_free(&measured, &self.values.0, &self.values.1))
+    }
 }
 
 /// A recording to learn from.
@@ -95,8 +113,8 @@ pub struct Lesson<'a> {
     pub samples: &'a Samples,
 }
 
-/// Finds parameters with which traffic looks like the recordings. The free traffic drives on the
-/// road of the first one; `base` gives everything that is not searched.
+/// Finds populations and a rim with which traffic looks like the recordings; `base` gives
+/// everything that is not searched.
 ///
 /// # Errors
 /// [`TrafficError`] for recordings without samples or a road without lanes.
@@ -107,77 +125,61 @@ pub fn calibrate(
 ) -> Result<Calibration, TrafficError> {
     let judge = Judge::of(lessons, base, effort.trial_s)?;
     let Effort { generations, seed, .. } = effort;
-    let knobs = guess(&judge.start, &judge.together, judge.rims());
-    let alone = search::minimum(
-        &range_of::<DRIVERS>(0),
-        &part_of(&knobs, 0),
+    let people = search::minimum(
+        &bounds(&POPULATION),
+        &usual(&POPULATION),
         generations,
         seed,
-        |drivers: &[f64; DRIVERS]| judge.bounded(&turned(&judge.start, &with(&knobs, 0, drivers))),
-    )?;
-    let knobs = with(&knobs, 0, &alone.best);
-    let reached = judge.bounded(&turned(&judge.start, &knobs))?;
-    let both = search::minimum(
-        &range_of::<FOLLOWING>(0),
-        &part_of(&knobs, 0),
-        generations / 2,
-        seed.wrapping_add(1),
-        |following: &[f64; FOLLOWING]| {
-            let config = turned(&judge.start, &with(&knobs, 0, following));
-            let worse = (judge.bounded(&config)? - reached - HARDLY_WORSE).max(0.0);
-            Ok::<f64, TrafficError>(judge.free(&config)? + WORSE_WEIGHT * worse)
+        |x: &[f64; POPULATION.len()]| {
+            let cost = judge.bounded(&with_population(base, x))?;
+            Ok::<f64, TrafficError>(cost + UNUSUAL_WEIGHT * unusual(&POPULATION, x))
         },
     )?;
-    let knobs = with(&knobs, 0, &both.best);
-    let rim = search::minimum(
-        &range_of::<RIM>(DRIVERS),
-        &part_of(&knobs, DRIVERS),
-        generations / 2,
-        seed.wrapping_add(2),
-        |rim: &[f64; RIM]| judge.free(&turned(&judge.start, &with(&knobs, DRIVERS, rim))),
+    let free = search::minimum(
+        &bounds(&FREE),
+        &usual(&FREE),
+        generations,
+        seed.wrapping_add(1),
+        |x: &[f64; FREE.len()]| {
+            let cost = judge.free(base, &people.best, x)?;
+            Ok::<f64, TrafficError>(cost + UNUSUAL_WEIGHT * unusual(&FREE, x))
+        },
     )?;
-    let config = turned(&judge.start, &with(&knobs, DRIVERS, &rim.best));
-    let (distance, free_distance) = (judge.bounded(&config)?, judge.free(&config)?);
-    let trials = alone.trials + both.trials + rim.trials;
-    Ok(Calibration { config, distance, free_distance, trials })
-}
-
-/// Bounds of the knobs from this one on.
-fn range_of<const N: usize>(first: usize) -> [(f64, f64); N] {
-    std::array::from_fn(|k| {
-        let (_, low, high) = BOUNDS[first + k];
-        (low, high)
+    let config = with_population(base, &people.best);
+    Ok(Calibration {
+        distance: judge.bounded(&config)?,
+        free_distance: judge.free(base, &people.best, &free.best)?,
+        config,
+        population: named(&POPULATION, &people.best),
+        free: named(&FREE, &free.best),
+        trials: people.trials + free.trials,
+        values: (people.best, free.best),
     })
 }
 
-fn part_of<const N: usize>(knobs: &Knobs, first: usize) -> [f64; N] {
-    std::array::from_fn(|k| knobs[first + k])
+fn named<const N: usize>(
+    knobs: &[Knob; N],
+    values: &[f64; N],
+) -> Vec<(&'static str, f64, (f64, f64))> {
+    knobs.iter().zip(values).map(|(k, &x)| (k.key, x, k.bounds())).collect()
 }
 
-/// The knobs with others from this one on.
-fn with<const N: usize>(knobs: &Knobs, first: usize, part: &[f64; N]) -> Knobs {
-    let mut all = *knobs;
-    all[first..first + N].copy_from_slice(part);
-    all
-}
-
-/// A recording as the bounded traffic needs it, and its sorted samples.
+/// A recording as the searches need it, and its sorted samples.
 struct Measured<'a> {
+    lesson: Lesson<'a>,
     boundary: Arc<Boundary>,
-    road: &'a Arc<Road>,
     samples: Samples,
+    /// Its part of the measure.
+    weight: f64,
 }
 
 /// All recordings, and how far traffic is from them.
 struct Judge<'a> {
     each: Vec<Measured<'a>>,
-    /// Samples of all recordings, sorted.
-    together: Samples,
-    /// Road of the free traffic.
-    road: &'a Arc<Road>,
-    /// The measured demand.
-    start: TrafficConfig,
+    /// Lane changes of all recordings per vehicle and km.
+    changes_1_km: f64,
     trial_s: f64,
+    seed: u64,
 }
 
 impl<'a> Judge<'a> {
@@ -186,56 +188,57 @@ impl<'a> Judge<'a> {
         base: &TrafficConfig,
         trial_s: f64,
     ) -> Result<Self, TrafficError> {
-        let mut together = lessons.first().map(|l| l.samples.clone()).unwrap_or_default();
-        lessons.iter().skip(1).for_each(|lesson| together.append(lesson.samples));
-        let Some(first) = lessons
-            .first()
-            .filter(|_| !together.of(Quantity::Gap).is_empty() && together.duration_s >= 1.0)
-        else {
+        let has_gaps = |l: &Lesson<'_>| !l.samples.of(Quantity::Gap).is_empty();
+        let all_s: f64 = lessons.iter().map(|l| l.samples.duration_s).sum();
+        if !lessons.iter().any(has_gaps) || all_s < 1.0 {
             let why = "the recordings hold no vehicle behind another one".to_owned();
             return Err(TrafficError::Config { why });
-        };
-        together.sort();
+        }
         let measured = |lesson: &Lesson<'a>| {
             let mut samples = lesson.samples.clone();
             samples.sort();
             let boundary = Arc::new(Boundary::of(lesson.road, lesson.recording)?);
-            Ok(Measured { boundary, road: lesson.road, samples })
+            let weight = lesson.samples.duration_s / all_s;
+            Ok(Measured { lesson: *lesson, boundary, samples, weight })
         };
-        let start = with_measured_demand(base, lessons, &together);
         let each = lessons.iter().map(measured).collect::<Result<Vec<_>, TrafficError>>()?;
-        Ok(Self { each, together, road: first.road, start, trial_s })
+        let changes: usize = lessons.iter().map(|l| l.samples.lane_changes).sum();
+        let driven_km: f64 = lessons.iter().map(|l| l.samples.driven_km).sum();
+        let changes_1_km = changes as f64 / driven_km.max(1e-9);
+        Ok(Self { each, changes_1_km, trial_s, seed: base.seed })
     }
 
-    fn rims(&self) -> impl Iterator<Item = &Boundary> + Clone {
-        self.each.iter().map(|measured| &*measured.boundary)
-    }
-
-    /// How far free traffic is from a recording: mean of all pairs of a drive and a recording, so
-    /// that a recording that is unlike all others weighs no more than they do, and what one seed
-    /// happens to do does not count as found.
-    fn free(&self, config: &TrafficConfig) -> Result<f64, TrafficError> {
+    /// How far free traffic is from its recording, mean of them.
+    fn free(
+        &self,
+        base: &TrafficConfig,
+        population: &[f64; POPULATION.len()],
+        values: &[f64; FREE.len()],
+    ) -> Result<f64, TrafficError> {
         let mut sum = 0.0;
-        for k in 0..DRIVES {
-            let seed = self.start.seed.wrapping_add(k);
-            let config = TrafficConfig { seed, ..config.clone() };
-            let mut samples = drive(self.road, config, self.trial_s)?;
-            samples.sort();
-            sum += self.each.iter().map(|p| distance(&samples, &p.samples)).sum::<f64>();
+        for m in &self.each {
+            let measured = with_measured_demand(base, &m.lesson, &m.boundary);
+            let config = with_free(&measured, population, values);
+            for k in 0..FREE_DRIVES {
+                let config = TrafficConfig { seed: self.seed.wrapping_add(k), ..config.clone() };
+                let mut samples = drive(m.lesson.road, config, self.trial_s)?;
+                samples.sort();
+                sum += m.weight * distance(&samples, &m.samples) / FREE_DRIVES as f64;
+            }
         }
-        Ok(sum / (DRIVES as usize * self.each.len()) as f64)
+        Ok(sum)
     }
 
-    /// How far bounded traffic is from its own recording, mean of them, and from the rate of lane
+    /// How far bounded traffic is from its recording, mean of them, and from the rate of lane
     /// changes of all.
     fn bounded(&self, config: &TrafficConfig) -> Result<f64, TrafficError> {
-        let (mut together, mut apart) = (Samples::default(), 0.0);
-        for p in &self.each {
-            let own = drive_bounded(p.road, config, &p.boundary, BOUNDED_DRIVES)?;
-            apart += distance(&own, &p.samples) / self.each.len() as f64;
-            together.append(&own);
+        let (mut changes, mut driven_km, mut apart) = (0, 0.0, 0.0);
+        for m in &self.each {
+            let own = drive_bounded(m.lesson.road, config, &m.boundary, BOUNDED_DRIVES)?;
+            apart += m.weight * distance(&own, &m.samples);
+            (changes, driven_km) = (changes + own.lane_changes, driven_km + own.driven_km);
         }
-        let (rate, wanted) = (together.lane_changes_1_km(), self.together.lane_changes_1_km());
+        let (rate, wanted) = (changes as f64 / f64::max(driven_km, 1e-9), self.changes_1_km);
         let changes = (rate - wanted).abs() / (rate + wanted).max(1e-9);
         Ok(apart + LANE_CHANGE_WEIGHT * changes)
     }

@@ -1,7 +1,7 @@
 //! Search for the minimum of a function that is expensive and not smooth: differential evolution
 //! (Storn & Price, J. Global Optimization 11, 1997).
 //!
-//! Half of the trials start from the best member, the others from any; one member in three begins
+//! Half of the trials start from the best member, the others from any; one member in six begins
 //! anywhere, the others around a first guess. Same seed, same result.
 
 use crate::philox::{Draws, Stream};
@@ -9,9 +9,9 @@ use crate::philox::{Draws, Stream};
 /// Members of the population.
 const MEMBERS: usize = 18;
 /// Range around the first guess in which members begin, as a part of it.
-const AROUND: f64 = 0.4;
+const AROUND: f64 = 0.3;
 /// Differential weight and crossover probability.
-const SCALE: f64 = 0.6;
+const SCALE: f64 = 0.5;
 const CROSSOVER: f64 = 0.8;
 
 /// What a search found.
@@ -40,7 +40,7 @@ pub(crate) fn minimum<const N: usize, E>(
             std::array::from_fn(|k| {
                 let (low, high) = bounds[k];
                 let u = draw(0, m, k as u32);
-                match m % 3 {
+                match m % 6 {
                     0 if m > 0 => low + (high - low) * u,
                     0 => guess[k],
                     _ => (guess[k] * (1.0 + AROUND * (2.0 * u - 1.0))).clamp(low, high),

@@ -138,8 +138,9 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let read = |paths: &[PathBuf]| Measured::read(paths, args.lanes.into(), args.carriageway);
     let measured = read(&args.compare)?;
     let learned = read(&args.calibrate)?;
+    let mut drivers = scenario.traffic.demand(seed);
     if !args.calibrate.is_empty() {
-        scenario = calibrated(args, &out, scenario, &learned, seed)?;
+        (scenario, drivers) = calibrated(args, &out, scenario, &learned, seed)?;
     }
     if args.diagram {
         diagram::draw(&scenario, seed, &out)?;
@@ -148,7 +149,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let driven = drive(args, &out, &scenario, seed, &stop)?;
     let bounded = match driven.end {
         End::Interrupted => Vec::new(),
-        _ => bounded(&scenario, seed, &measured)?,
+        _ => bounded(&scenario, &drivers, &measured)?,
     };
     let report = Report::new(&scenario, seed, &driven, &measured, &bounded, &args.calibrate);
     let json = serde_json::to_string_pretty(&report).map_err(Failure::work)?;
@@ -162,15 +163,18 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 /// Drives of bounded traffic per recording.
 const BOUNDED_DRIVES: u64 = 4;
 
-/// The scenario's drivers between the measured start, arrivals and end of each recording.
-fn bounded(scenario: &Scenario, seed: u64, measured: &Measured) -> Result<Vec<Samples>, Failure> {
+/// Drivers between the measured start, arrivals and end of each recording.
+fn bounded(
+    scenario: &Scenario,
+    drivers: &TrafficConfig,
+    measured: &Measured,
+) -> Result<Vec<Samples>, Failure> {
     if scenario.traffic.source != TrafficKind::Native {
         return Ok(Vec::new());
     }
-    let config = scenario.traffic.demand(seed);
     let drive = |recording, road| {
         let boundary = Arc::new(Boundary::of(road, recording)?);
-        drive_bounded(road, &config, &boundary, BOUNDED_DRIVES)
+        drive_bounded(road, drivers, &boundary, BOUNDED_DRIVES)
     };
     let pairs = measured.recordings.iter().zip(&measured.roads);
     pairs.map(|(recording, road)| drive(recording, road).map_err(Failure::input)).collect()
@@ -281,14 +285,16 @@ fn in_the_middle(road: &Road) -> EgoState {
     EgoState { s_m, x_m: at.x_m, y_m: at.y_m, yaw_rad: at.heading_rad, ..EgoState::default() }
 }
 
-/// The scenario with drivers like those of the recordings, on the recorded road; also written.
+/// The scenario with free traffic like that of the recordings, on the road and with the boundary of
+/// the first one, and the drivers of bounded traffic; both also written, as `calibrated.toml` and
+/// `calibrated-drivers.toml`.
 fn calibrated(
     args: &Args,
     out: &OutFolder,
     scenario: Scenario,
     learned: &Measured,
     seed: u64,
-) -> Result<Scenario, Failure> {
+) -> Result<(Scenario, TrafficConfig), Failure> {
     let (Some(road), Some(file)) = (learned.road(), learned.files.first()) else {
         return Err(Failure::Input("--calibrate: no recording".to_owned()));
     };
@@ -306,7 +312,16 @@ fn calibrated(
         .collect();
     let found = calibrate(&lessons, &base, effort).map_err(Failure::input)?;
     stages.finish();
+    let drivers = TrafficConfig { seed, ..found.config.clone() };
     let mut scenario = scenario;
+    let mut of_drivers = scenario.clone();
+    of_drivers.name = format!("{}-calibrated-drivers", scenario.name);
+    of_drivers.traffic.native = drivers.clone();
+    of_drivers.traffic.family = None;
+    let text = toml::to_string(&of_drivers).map_err(Failure::work)?;
+    out.write("calibrated-drivers.toml", text)?;
+    let first = lessons.first().map(|lesson| found.free_traffic(lesson)).transpose();
+    let free = first.map_err(Failure::input)?.unwrap_or_else(|| drivers.clone());
     scenario.name = format!("{}-calibrated", scenario.name);
     scenario.description = format!(
         "Native drivers calibrated to {} recordings: weighted distance {:.3} in bounded and {:.3} in \
@@ -323,9 +338,9 @@ fn calibrated(
     let absolute = std::fs::canonicalize(file).map_err(|e| Failure::file(file, e))?;
     traffic.replay.file = Some(absolute.display().to_string());
     traffic.replay.carriageway = args.carriageway.into();
-    traffic.native = TrafficConfig { seed, ..found.config };
+    traffic.native = TrafficConfig { seed, ..free };
     let text = toml::to_string(&scenario).map_err(Failure::work)?;
     out.write("calibrated.toml", text)?;
     scenario.traffic.mode = Some(Mode::Pure);
-    Ok(scenario)
+    Ok((scenario, drivers))
 }

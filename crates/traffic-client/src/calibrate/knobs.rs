@@ -1,103 +1,120 @@
-//! What is searched, what is taken from the recordings as it is, and the traffic that both make.
+//! What is searched, what is known of it beforehand, and the traffic that it makes.
 
 use tractrix_core::VehicleClass;
 
 use super::{Lesson, lanes_m};
 use crate::native::{Boundary, ClassConfig, TrafficConfig};
-use crate::stats::{Quantity, Samples};
+use crate::stats::moments;
 
-/// Searched quantities with their bounds, in the order of [`Knobs`].
-pub(super) const BOUNDS: [(&str, f64, f64); 14] = [
-    ("max_speed_m_s", 5.0, 40.0),
-    ("speed_factor_sigma_frac", 0.01, 0.24),
-    ("headway_s", 0.5, 3.0),
-    ("min_gap_m", 1.0, 6.0),
-    ("accel_m_s2", 0.4, 3.0),
-    ("decel_m_s2", 0.8, 4.0),
-    ("politeness_frac", 0.0, 1.0),
-    ("threshold_m_s2", 0.02, 1.5),
-    ("right_bias_m_s2", -0.3, 0.5),
-    ("inflow_speed_m_s", 1.0, 35.0),
-    ("inflow_sigma_m_s", 0.0, 6.0),
-    ("outflow_speed_m_s", 0.5, 35.0),
-    ("outflow_sigma_m_s", 0.0, 8.0),
-    ("outflow_period_s", 3.0, 25.0),
+/// A searched quantity with what published calibrations say of it.
+#[derive(Clone, Copy)]
+pub(super) struct Knob {
+    /// Key in the configuration, of cars.
+    pub(super) key: &'static str,
+    /// Usual value.
+    usual: f64,
+    /// Standard deviation: of the logarithm where `is_ratio`, else of the value.
+    sigma: f64,
+    is_ratio: bool,
+}
+
+/// Free traffic begins with the measured density and settles for so long, s: longer, and it would
+/// forget a jam that the stretch began with and that neither end shows.
+const WARM_UP_S: f64 = 20.0;
+
+/// Search goes this many standard deviations to either side of the usual value.
+const REACH: f64 = 3.0;
+
+const fn ratio(key: &'static str, usual: f64, sigma: f64) -> Knob {
+    Knob { key, usual, sigma, is_ratio: true }
+}
+
+const fn value(key: &'static str, usual: f64, sigma: f64) -> Knob {
+    Knob { key, usual, sigma, is_ratio: false }
+}
+
+/// The drivers. Following: IDM calibrations to trajectories (Kesting & Treiber, Transp. Res. Record
+/// 2088 (2008) 148: T 1.0 to 1.6 s, s0 1.5 to 3 m, a 0.8 to 2.4 m/s², b 0.7 to 1.9 m/s²; Punzo,
+/// Montanino, Ciuffo, IEEE T-ITS 16 (2015) 184; Kurtc, Transp. Res. Record 2674 (2020) 813, highD).
+/// Changing: Kesting, Treiber, Helbing (2007). Desired speeds: HCM 6th ed., free-flow speeds.
+pub(super) const POPULATION: [Knob; 10] = [
+    ratio("max_speed_m_s", 27.0, 0.25),
+    ratio("speed_factor_sigma_frac", 0.1, 0.3),
+    ratio("headway_s", 1.25, 0.25),
+    ratio("headway_sigma_frac", 0.45, 0.2),
+    ratio("min_gap_m", 2.0, 0.25),
+    ratio("accel_m_s2", 1.2, 0.4),
+    ratio("decel_m_s2", 1.7, 0.3),
+    value("politeness_frac", 0.35, 0.1),
+    ratio("threshold_m_s2", 0.15, 0.5),
+    value("right_bias_m_s2", 0.1, 0.1),
 ];
-pub(super) type Knobs = [f64; BOUNDS.len()];
-/// The last of them belong to the traffic before and beyond the stretch, the others to the drivers.
-pub(super) const RIM: usize = 5;
-/// The first of them say how somebody follows.
-pub(super) const FOLLOWING: usize = 5;
-pub(super) const DRIVERS: usize = BOUNDS.len() - RIM;
 
-/// Inflow, density, classes and lengths as measured.
-pub(super) fn with_measured_demand(
-    base: &TrafficConfig,
-    lessons: &[Lesson<'_>],
-    measured: &Samples,
-) -> TrafficConfig {
-    let mut config = base.clone();
-    let lanes_m =
-        lessons.iter().map(|l| lanes_m(l.road)).sum::<f64>() / lessons.len().max(1) as f64;
-    let density_1_km = measured.density_1_km(lanes_m);
-    // Demand a little above the measured flow: the queue before the stretch is always there when
-    // the flow is set by the congestion beyond it.
-    let flow_1_s = 1.05 * measured.flow_1_h(lanes_m) / 3600.0;
-    config.spawn_probability = (flow_1_s * config.spawn_interval_s).clamp(0.0, 1.0);
-    config.initial_density_1_km = Some(density_1_km.min(120.0));
-    // Long enough for the speed beyond the end to reach back over a stretch of a kilometre.
-    config.warm_up_s = 150.0;
-    let tracks = || lessons.iter().flat_map(|l| &l.recording.tracks);
-    let share = |class| {
-        tracks().filter(|t| t.class == class).count() as f64 / tracks().count().max(1) as f64
-    };
-    config.truck_share_frac = share(VehicleClass::Truck);
-    config.van_share_frac = share(VehicleClass::Van).min(1.0 - config.truck_share_frac);
-    for (class, own) in [
-        (VehicleClass::Car, &mut config.car),
-        (VehicleClass::Van, &mut config.van),
-        (VehicleClass::Truck, &mut config.truck),
-    ] {
-        let lengths: Vec<f64> = tracks().filter(|t| t.class == class).map(|t| t.length_m).collect();
-        if let Some(m) = crate::stats::moments(&lengths) {
-            own.length_m = m.mean.clamp(1.0, 40.0);
-            own.length_spread_m = (1.7 * m.sigma).min(0.4 * own.length_m);
+/// How many of them say how somebody follows; they come first.
+const FOLLOWING: usize = 7;
+
+/// How measured flow and speeds at both ends become a boundary of free traffic.
+const RIM: [Knob; 4] = [
+    ratio("spawn_probability", 1.1, 0.1),
+    ratio("inflow_sigma_m_s", 1.0, 0.3),
+    ratio("outflow_sigma_m_s", 1.0, 0.3),
+    ratio("outflow_period_s", 10.0, 0.3),
+];
+
+/// Free traffic: how its drivers follow, and its rim.
+pub(super) const FREE: [Knob; FOLLOWING + RIM.len()] = {
+    let [a, b, c, d, e, f, g, ..] = POPULATION;
+    let [h, i, j, k] = RIM;
+    [a, b, c, d, e, f, g, h, i, j, k]
+};
+
+impl Knob {
+    /// Bounds of the search.
+    pub(super) fn bounds(&self) -> (f64, f64) {
+        if self.is_ratio {
+            let factor = libm::exp(REACH * self.sigma);
+            (self.usual / factor, self.usual * factor)
+        } else {
+            (self.usual - REACH * self.sigma, self.usual + REACH * self.sigma)
         }
     }
-    config
+
+    /// How unusual a value is, in standard deviations.
+    pub(super) fn unusual(&self, x: f64) -> f64 {
+        let away = if self.is_ratio { libm::log(x / self.usual) } else { x - self.usual };
+        away / self.sigma
+    }
 }
 
-/// Where the search begins: what can be read off the samples.
-pub(super) fn guess<'a>(
-    start: &TrafficConfig,
-    measured: &Samples,
-    rims: impl Iterator<Item = &'a Boundary> + Clone,
-) -> Knobs {
-    let speed = crate::stats::moments(measured.of(Quantity::Speed)).unwrap_or_default();
-    let wish = [1.2 * speed.p95, 0.12, start.car.headway_s, start.car.min_gap_m];
-    let car = start.car;
-    let follow = [car.accel_m_s2, car.decel_m_s2];
-    let change = [car.politeness_frac, car.threshold_m_s2, car.right_bias_m_s2];
-    let about = |speeds: Vec<f64>| crate::stats::moments(&speeds).unwrap_or(speed);
-    let before = about(rims.clone().flat_map(Boundary::inflow_m_s).collect());
-    let beyond = about(rims.flat_map(Boundary::outflow_m_s).collect());
-    let beyond = [before.mean, before.sigma, beyond.mean, beyond.sigma, 12.0];
-    let all: Vec<f64> = wish.into_iter().chain(follow).chain(change).chain(beyond).collect();
-    std::array::from_fn(|k| {
-        let (_, low, high) = BOUNDS[k];
-        all.get(k).copied().unwrap_or(low).clamp(low, high)
-    })
+/// Bounds of knobs.
+pub(super) fn bounds<const N: usize>(knobs: &[Knob; N]) -> [(f64, f64); N] {
+    std::array::from_fn(|k| knobs[k].bounds())
 }
 
-/// The traffic with these values. Vans and trucks keep their proportions to cars.
-pub(super) fn turned(start: &TrafficConfig, knobs: &Knobs) -> TrafficConfig {
-    let [max_speed, sigma, headway, gap, accel, decel, rest @ ..] = *knobs;
-    let [politeness, threshold, bias, in_speed, in_sigma, out_speed, out_sigma, out_period] = rest;
-    let mut config = start.clone();
-    let car = start.car;
+/// Usual values of knobs.
+pub(super) fn usual<const N: usize>(knobs: &[Knob; N]) -> [f64; N] {
+    std::array::from_fn(|k| knobs[k].usual)
+}
+
+/// Mean square of how unusual values are.
+pub(super) fn unusual<const N: usize>(knobs: &[Knob; N], values: &[f64; N]) -> f64 {
+    let squares = knobs.iter().zip(values).map(|(k, &x)| k.unusual(x) * k.unusual(x));
+    squares.sum::<f64>() / N as f64
+}
+
+/// Traffic with this population. Vans and trucks keep their proportions to cars.
+pub(super) fn with_population(
+    base: &TrafficConfig,
+    values: &[f64; POPULATION.len()],
+) -> TrafficConfig {
+    let [max_speed, sigma, headway, headway_sigma, gap, accel, decel, rest @ ..] = *values;
+    let [politeness, threshold, bias] = rest;
+    let mut config = base.clone();
+    let car = base.car;
     let change = |c: &mut ClassConfig| {
         c.speed_factor_sigma_frac = sigma.min(0.24 * c.speed_factor_frac);
         c.headway_s = (c.headway_s * headway / car.headway_s).clamp(0.3, 10.0);
+        c.headway_sigma_frac = headway_sigma;
         c.min_gap_m = (c.min_gap_m * gap / car.min_gap_m).clamp(0.5, 20.0);
         c.accel_m_s2 = (c.accel_m_s2 * accel / car.accel_m_s2).clamp(0.1, 6.0);
         c.decel_m_s2 = (c.decel_m_s2 * decel / car.decel_m_s2).clamp(0.3, 5.0);
@@ -108,11 +125,69 @@ pub(super) fn turned(start: &TrafficConfig, knobs: &Knobs) -> TrafficConfig {
         change(class);
     }
     config.max_speed_m_s = max_speed;
-    config.inflow_speed_m_s = Some(in_speed);
-    config.inflow_sigma_m_s = in_sigma;
-    config.outflow_speed_m_s = Some(out_speed);
-    (config.outflow_sigma_m_s, config.outflow_period_s) = (out_sigma, out_period);
     config
+}
+
+/// Inflow, density, classes, lengths, and the speeds at both ends as measured: all that a detector
+/// before and one behind the stretch know.
+pub(super) fn with_measured_demand(
+    base: &TrafficConfig,
+    lesson: &Lesson<'_>,
+    boundary: &Boundary,
+) -> TrafficConfig {
+    let mut config = base.clone();
+    let lanes_m = lanes_m(lesson.road);
+    let measured = lesson.samples;
+    let flow_1_s = measured.flow_1_h(lanes_m) / 3600.0;
+    config.spawn_probability = (flow_1_s * config.spawn_interval_s).clamp(0.0, 1.0);
+    config.initial_density_1_km = Some(measured.density_1_km(lanes_m).min(120.0));
+    config.warm_up_s = WARM_UP_S;
+    let tracks = &lesson.recording.tracks;
+    let share = |class| {
+        tracks.iter().filter(|t| t.class == class).count() as f64 / tracks.len().max(1) as f64
+    };
+    config.truck_share_frac = share(VehicleClass::Truck);
+    config.van_share_frac = share(VehicleClass::Van).min(1.0 - config.truck_share_frac);
+    for (class, own) in [
+        (VehicleClass::Car, &mut config.car),
+        (VehicleClass::Van, &mut config.van),
+        (VehicleClass::Truck, &mut config.truck),
+    ] {
+        let of_class = tracks.iter().filter(|t| t.class == class);
+        let lengths: Vec<f64> = of_class.map(|t| t.length_m).collect();
+        if let Some(m) = moments(&lengths) {
+            own.length_m = m.mean.clamp(1.0, 40.0);
+            own.length_spread_m = (1.7 * m.sigma).min(0.4 * own.length_m);
+        }
+    }
+    let about = |speeds: Vec<f64>| moments(&speeds);
+    if let Some(before) = about(boundary.inflow_m_s().collect()) {
+        config.inflow_speed_m_s = Some(before.mean.max(1.0));
+        config.inflow_sigma_m_s = before.sigma.min(30.0);
+    }
+    if let Some(beyond) = about(boundary.outflow_m_s().collect()) {
+        config.outflow_speed_m_s = Some(beyond.mean.max(0.0));
+        config.outflow_sigma_m_s = beyond.sigma.min(30.0);
+    }
+    config
+}
+
+/// Free traffic: the following of a population and the rim turned to these values.
+pub(super) fn with_free(
+    measured: &TrafficConfig,
+    population: &[f64; POPULATION.len()],
+    values: &[f64; FREE.len()],
+) -> TrafficConfig {
+    let mut people = *population;
+    people[..FOLLOWING].copy_from_slice(&values[..FOLLOWING]);
+    let [.., surplus, in_sigma, out_sigma, period_s] = *values;
+    TrafficConfig {
+        spawn_probability: (surplus * measured.spawn_probability).min(1.0),
+        inflow_sigma_m_s: (in_sigma * measured.inflow_sigma_m_s).min(30.0),
+        outflow_sigma_m_s: (out_sigma * measured.outflow_sigma_m_s).min(30.0),
+        outflow_period_s: period_s,
+        ..with_population(measured, &people)
+    }
 }
 
 #[cfg(test)]
@@ -123,9 +198,10 @@ mod tests {
     fn every_corner_of_the_search_is_a_valid_configuration() {
         let start = TrafficConfig::default();
         for high in [false, true] {
-            let corner: Knobs =
-                std::array::from_fn(|k| if high { BOUNDS[k].2 } else { BOUNDS[k].1 });
-            turned(&start, &corner).validate().unwrap();
+            let corner = bounds(&POPULATION).map(|(a, b)| if high { b } else { a });
+            with_population(&start, &corner).validate().unwrap();
+            let free = bounds(&FREE).map(|(a, b)| if high { b } else { a });
+            with_free(&start, &corner, &free).validate().unwrap();
         }
     }
 }

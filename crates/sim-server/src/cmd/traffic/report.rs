@@ -287,6 +287,15 @@ impl Report {
             };
             text.push_str(&comparison.line(distances));
         }
+        for one in &self.recordings {
+            let speed = |d: &Distances| d.get("speed_m_s").map_or(1.0, |d| d.ks);
+            let (file, alone) = (&one.file, speed(&one.distances));
+            text.push_str(&format!("\n  {file}: KS of speed {alone:.3}"));
+            if let Some(b) = &one.bounded {
+                let (ks, kept) = (speed(&b.distances), b.ks_of_kept_speeds);
+                text.push_str(&format!(", bounded {ks:.3}, with kept speeds {kept:.3}"));
+            }
+        }
         text
     }
 }
