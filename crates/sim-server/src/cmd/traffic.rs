@@ -106,6 +106,7 @@ const RESULTS: &[&str] = &[
     "statistics.html",
     "traffic.manifest.toml",
     "calibrated.toml",
+    "calibrated-drivers.toml",
     "diagram.json",
     "diagram.html",
     "sumo",
