@@ -1,12 +1,12 @@
 //! The other vehicles as the rows of a NumPy structured array.
 //!
 //! One packed row per vehicle, little-endian, in the order of `tractrix.SCENE_DTYPE`:
-//! `id` u64, `class` 5 UCS-4 characters, six lengths and speeds, acceleration, lanes, map pose.
+//! `id` u64, `class` 9 UCS-4 characters, six lengths and speeds, acceleration, lanes, map pose.
 
 use tractrix_core::{Neighbour, VehicleClass};
 
-/// Characters of the longest class, `truck`.
-const CLASS_CHARS: usize = 5;
+/// Characters of the longest class, `emergency`.
+const CLASS_CHARS: usize = 9;
 /// Bytes of a row.
 const ROW_BYTES: usize = 8 + 4 * CLASS_CHARS + 7 * 8 + 2 * 4 + 3 * 8;
 /// `target_lane` of a vehicle that keeps its lane.
@@ -21,6 +21,8 @@ pub(crate) fn rows(neighbours: &[Neighbour]) -> Vec<u8> {
             VehicleClass::Car => "car",
             VehicleClass::Van => "van",
             VehicleClass::Truck => "truck",
+            VehicleClass::Emergency => "emergency",
+            VehicleClass::Barrier => "barrier",
         }
         .chars();
         for _ in 0..CLASS_CHARS {

@@ -112,7 +112,7 @@ class Decision(NamedTuple):
 SCENE_DTYPE = np.dtype(
     [
         ("id", "<u8"),
-        ("class", "<U5"),
+        ("class", "<U9"),
         ("front_s_m", "<f8"),
         ("rear_s_m", "<f8"),
         ("d_m", "<f8"),
@@ -129,7 +129,7 @@ SCENE_DTYPE = np.dtype(
 )
 """Columns of `World.scene()`.
 
-`id` is stable within a run; `class` is `car`, `van` or `truck`; `front_s_m` and `rear_s_m` are the
+`id` is stable within a run; `class` is `car`, `van`, `truck`, `emergency` or `barrier`; `front_s_m` and `rear_s_m` are the
 stations of the bumpers, so that a gap is a subtraction; `d_m` is the offset of the centre line from
 the reference line, positive left; speeds and acceleration are along the road, `lateral_speed_m_s` to
 the left; `target_lane` is -1 without a lane change; `x_m`, `y_m`, `yaw_rad` are the centre of the body

@@ -135,7 +135,7 @@ fn recorded_traffic_is_driven_in_mode_rep_whichever_engine_it_came_from() {
         let (rows, frame) = (recorder.rows.clone(), traffic_client::replay::Frame::Map);
         let recording =
             traffic_client::replay::Recording::from_rows("t", frame, rows, 0.1).unwrap();
-        traffic_client::replay::write_parquet(&file, &recording).unwrap();
+        std::fs::write(&file, traffic_client::replay::to_parquet(&recording).unwrap()).unwrap();
         let mut rep = scenario(TrafficKind::Replay, None, 15.0);
         rep.traffic.replay.file = Some(file.display().to_string());
         let mut recorder = SceneRecorder::default();

@@ -16,6 +16,10 @@ pub enum VehicleClass {
     Van,
     /// Heavy truck or bus.
     Truck,
+    /// A vehicle with right of way: others keep clear of it.
+    Emergency,
+    /// Something that stands on the road and is no vehicle: the barrier of a closed lane.
+    Barrier,
 }
 
 /// Another vehicle. Front and rear are given explicitly, so that a gap is a subtraction.

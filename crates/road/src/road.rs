@@ -142,6 +142,18 @@ impl Road {
         self.geo_reference.as_ref()
     }
 
+    /// The same road with a speed limit (m/s) everywhere, where its own is higher: a limit that
+    /// holds for a time.
+    #[must_use]
+    pub fn with_limit_cap(&self, cap_m_s: f64) -> Self {
+        let mut road = self.clone();
+        let lanes = road.lanes.iter_mut().flat_map(|lane| &mut lane.speed_limits);
+        for (_, limit_m_s) in road.limits.iter_mut().chain(lanes) {
+            *limit_m_s = limit_m_s.min(cap_m_s.max(0.1));
+        }
+        road
+    }
+
     /// Tunnels and bridges along the road.
     #[must_use]
     pub fn objects(&self) -> &[RoadObject] {

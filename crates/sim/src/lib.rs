@@ -29,7 +29,7 @@ pub use run_report::{EndReason, RunReport, WallClock};
 pub use scenario::{EgoStart, RunLimits, Scenario, TruckSection, Weather};
 pub use sim_truck::SimTruck;
 pub use tick_times::{TickTime, TickTimes};
-pub use traffic::{Traffic, read_manifest, recording_of};
+pub use traffic::{Arrivals, Traffic, read_manifest, recording_of};
 pub use traffic_section::{
     Family, OnFailure, ReplaySection, SumoSection, SumoTimeouts, TrafficKind, TrafficSection,
 };

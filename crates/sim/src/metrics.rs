@@ -5,7 +5,7 @@ use std::collections::{HashSet, VecDeque};
 use planner::safety::{RearResponse, RssConfig, SafeGap};
 use road::Road;
 use serde::Serialize;
-use tractrix_core::{Geometry, Maneuver, Recorder, Tick, Time, VehicleLimits};
+use tractrix_core::{Geometry, Maneuver, Recorder, Tick, Time, VehicleClass, VehicleLimits};
 
 use crate::{Footprint, footprints_overlap};
 
@@ -275,7 +275,8 @@ impl Recorder for Metrics {
         self.last_maneuver = maneuver;
         self.max_lateral_error_m = self.max_lateral_error_m.max(tick.plan.lateral_error_m.abs());
         self.guard_activations += u64::from(!tick.plan.guard.is_empty());
-        self.met.extend(tick.scene.neighbours.iter().map(|n| n.id));
+        let vehicles = tick.scene.neighbours.iter().filter(|n| n.class != VehicleClass::Barrier);
+        self.met.extend(vehicles.map(|n| n.id));
         self.count_collisions(tick);
         self.watch_headway(tick);
         self.watch_trailer(tick);

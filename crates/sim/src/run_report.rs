@@ -4,7 +4,7 @@ use serde::Serialize;
 use tractrix_core::Provenance;
 use traffic_client::Mode;
 
-use crate::{Status, Summary, TickTime, World};
+use crate::{Arrivals, Status, Summary, TickTime, World};
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -72,6 +72,8 @@ struct TrafficReport {
     mode: Mode,
     /// Why the native engine went on in its place.
     failure: Option<String>,
+    /// Vehicles that came to the road, and those that wait before it; of native traffic.
+    arrivals: Option<Arrivals>,
 }
 
 impl RunReport {
@@ -93,6 +95,7 @@ impl RunReport {
                 engine: traffic.manifest().engine,
                 mode: traffic.mode(),
                 failure: traffic.failure().map(str::to_owned),
+                arrivals: traffic.arrivals(),
             },
             missed_deadlines: wall.missed_deadlines,
             tick_time_us: wall.tick_time_us,

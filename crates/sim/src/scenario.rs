@@ -12,11 +12,13 @@ use crate::{SimError, TrafficSection};
 const RECORDED_LIMIT_M_S: f64 = 33.33;
 
 /// Built-in scenarios: name and text.
-const BUILTIN: [(&str, &str); 10] = [
+const BUILTIN: [(&str, &str); 12] = [
     ("highway", include_str!("../scenarios/highway.toml")),
     ("highway-empty", include_str!("../scenarios/highway-empty.toml")),
     ("test-site", include_str!("../scenarios/test-site.toml")),
     ("flat", include_str!("../scenarios/flat.toml")),
+    ("incident", include_str!("../scenarios/incident.toml")),
+    ("rush-hour", include_str!("../scenarios/rush-hour.toml")),
     ("dense-12.5", include_str!("../scenarios/dense-12.5.toml")),
     ("dense-15", include_str!("../scenarios/dense-15.toml")),
     ("medium-12.5", include_str!("../scenarios/medium-12.5.toml")),

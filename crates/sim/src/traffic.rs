@@ -10,10 +10,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use road::Road;
+use serde::Serialize;
 use tempfile::TempDir;
 use tractrix_core::{EgoState, Geometry, Scene, Time, TrafficSource};
 use traffic_client::native::{NativeTraffic, TrafficConfig};
 use traffic_client::replay::{Recording, ReplayTraffic, load};
+use traffic_client::schedule::Schedule;
 use traffic_client::sumo::{Programs, SumoTraffic};
 use traffic_client::{Hashed, Manifest, Mode, Perceived, TrafficError};
 
@@ -31,6 +33,16 @@ const ROAD_SAMPLE_M: f64 = 50.0;
 pub struct Traffic {
     inner: Perceived<Hashed<Engine>>,
     mode: Mode,
+    schedule: Schedule,
+}
+
+/// Vehicles at the entries of the road.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Arrivals {
+    /// Those that came since the warm-up began.
+    pub came: u64,
+    /// Those that wait before the road now.
+    pub waiting: u64,
 }
 
 /// Where the vehicles come from.
@@ -97,7 +109,15 @@ impl Traffic {
         input("mode", word(mode));
         input("road", fingerprint_of(road));
         input("scenario", scenario_text(scenario)?);
-        let demand = TrafficConfig { sees_ego: mode == Mode::Inter, ..section.demand(seed) };
+        if let Some(file) = &section.detectors {
+            input("detectors", file_fingerprint(file.as_ref())?);
+        }
+        let demand = TrafficConfig {
+            sees_ego: mode == Mode::Inter,
+            schedule: section.schedule()?,
+            ..section.demand(seed)
+        };
+        let schedule = demand.schedule.clone();
         let engine = match section.source {
             TrafficKind::None => Engine::None(Scene::default()),
             TrafficKind::Native => {
@@ -136,13 +156,19 @@ impl Traffic {
             seed: seed ^ section.perception.seed,
             ..section.perception.clone()
         };
-        Ok(Self { inner: Perceived::new(hashed, perception)?, mode })
+        Ok(Self { inner: Perceived::new(hashed, perception)?, mode, schedule })
     }
 
     /// The mode that is driven; of a repeated run, the mode of the first.
     #[must_use]
     pub const fn mode(&self) -> Mode {
         self.mode
+    }
+
+    /// The speed limit of the whole road at a time (s), m/s, where one holds beside the road's own.
+    #[must_use]
+    pub fn limit_m_s(&self, time_s: f64) -> Option<f64> {
+        self.schedule.limit_m_s(time_s)
     }
 
     /// What is needed to repeat the run, and its fingerprints so far.
@@ -160,6 +186,19 @@ impl Traffic {
     pub fn failure(&self) -> Option<&str> {
         match self.inner.inner().inner() {
             Engine::Native(_, why) => why.as_deref(),
+            _ => None,
+        }
+    }
+
+    /// Vehicles that came to the road so far and those of them that wait before it for room: of
+    /// native traffic, where nobody who waits is lost.
+    #[must_use]
+    pub fn arrivals(&self) -> Option<Arrivals> {
+        match self.inner.inner().inner() {
+            Engine::Native(native, _) => {
+                let counts = native.counts();
+                Some(Arrivals { came: counts.arrived, waiting: counts.waiting })
+            }
             _ => None,
         }
     }
@@ -300,6 +339,7 @@ fn scenario_text(scenario: &Scenario) -> Result<String, SimError> {
     same.traffic.on_failure = OnFailure::default();
     same.traffic.sumo.binary = None;
     let files = same.traffic.replay.file.iter_mut().chain(&mut same.traffic.sumo.additional_files);
+    let files = files.chain(&mut same.traffic.detectors);
     for file in files.chain([&mut same.road, &mut same.truck.file]) {
         *file = base_name(file);
     }

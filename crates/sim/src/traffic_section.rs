@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use traffic_client::native::{Density, TrafficConfig};
 use traffic_client::replay::{Carriageway, ReplayConfig};
+use traffic_client::schedule::{DemandStep, EmergencyVehicle, Incident, Schedule, detectors};
 use traffic_client::sumo::{SumoConfig, Timeouts, TypeAttributes};
-use traffic_client::{Mode, PerceptionConfig};
+use traffic_client::{Mode, PerceptionConfig, TrafficError};
 
 /// Which traffic, and its figures.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -24,6 +25,18 @@ pub struct TrafficSection {
     pub family: Option<Family>,
     /// Demand and drivers, of the native engine and of SUMO.
     pub native: TrafficConfig,
+    /// Demand that changes, in order of its times.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub demand: Vec<DemandStep>,
+    /// Demand from detectors: a table of counts (CSV), lane by lane.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub detectors: Option<String>,
+    /// Vehicles that stop, lanes that are closed.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub incident: Vec<Incident>,
+    /// Vehicles with right of way.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub emergency_vehicle: Vec<EmergencyVehicle>,
     /// SUMO.
     pub sumo: SumoSection,
     /// The recording.
@@ -151,6 +164,21 @@ impl TrafficSection {
         demand
     }
 
+    /// What changes while the traffic runs, the detectors' counts read.
+    ///
+    /// # Errors
+    /// [`TrafficError::Config`] names the table, its line and what is wrong there.
+    pub fn schedule(&self) -> Result<Schedule, TrafficError> {
+        let mut demand = self.demand.clone();
+        if let Some(file) = &self.detectors {
+            demand.extend(detectors::load(Path::new(file))?);
+            demand.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        }
+        let mut emergency_vehicles = self.emergency_vehicle.clone();
+        emergency_vehicles.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+        Ok(Schedule { demand, incidents: self.incident.clone(), emergency_vehicles })
+    }
+
     /// SUMO's configuration with this demand.
     pub(crate) fn sumo_config(&self, traffic: TrafficConfig) -> SumoConfig {
         let SumoTimeouts { startup_s, answer_s } = self.sumo.timeouts;
@@ -173,7 +201,8 @@ impl TrafficSection {
 
     /// Files that are named relative to the scenario lie beside it.
     pub(crate) fn resolve_paths(&mut self, folder: &Path) {
-        let files = self.manifest.iter_mut().chain(&mut self.replay.file);
+        let files =
+            self.manifest.iter_mut().chain(&mut self.replay.file).chain(&mut self.detectors);
         for file in files.chain(&mut self.sumo.binary).chain(&mut self.sumo.additional_files) {
             *file = folder.join(&*file).display().to_string();
         }
@@ -196,6 +225,21 @@ impl TrafficSection {
         }
         if mode != Mode::Re && self.manifest.is_some() {
             wrong.push("traffic.manifest is for traffic.mode = re".to_owned());
+        }
+        let changes = [
+            ("demand", !self.demand.is_empty()),
+            ("detectors", self.detectors.is_some()),
+            ("incident", !self.incident.is_empty()),
+            ("emergency_vehicle", !self.emergency_vehicle.is_empty()),
+        ];
+        if matches!(source, TrafficKind::Replay | TrafficKind::None) {
+            for (key, _) in changes.iter().filter(|(_, is_set)| *is_set) {
+                let source = format!("{source:?}").to_lowercase();
+                wrong.push(format!(
+                    "traffic.{key} is for an engine (native, sumo); traffic.source = {source} \
+                     cannot change what drives"
+                ));
+            }
         }
         for (key, value, low, high) in [
             ("traffic.sumo.timeouts.startup_s", self.sumo.timeouts.startup_s, 0.1, 600.0),

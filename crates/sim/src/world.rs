@@ -28,6 +28,8 @@ pub enum Status {
 pub struct World {
     scenario: Scenario,
     road: Arc<Road>,
+    /// The road with the limit that holds now beside its own, and that limit, m/s.
+    limited: Option<(f64, Arc<Road>)>,
     truck: SimTruck,
     traffic: Traffic,
     stack: Stack,
@@ -119,6 +121,7 @@ impl World {
             sensors: scenario.traffic.perception.enabled,
             scenario: scenario.clone(),
             road,
+            limited: None,
             truck,
             traffic,
             stack,
@@ -137,13 +140,19 @@ impl World {
         if self.status != Status::Running {
             return Ok(self.status);
         }
+        let limit_m_s = self.traffic.limit_m_s(self.now.seconds());
+        if limit_m_s != self.limited.as_ref().map(|(limit_m_s, _)| *limit_m_s) {
+            self.limited =
+                limit_m_s.map(|limit| (limit, Arc::new(self.road.with_limit_cap(limit))));
+        }
+        let road = self.limited.as_ref().map_or(&self.road, |(_, road)| road);
         let mut judge = Judge { metrics: &mut self.metrics, sensors: self.sensors };
         let outcome = planner::drive_tick(
             self.now,
             &mut self.truck,
             &mut self.traffic,
             &mut self.stack,
-            &self.road,
+            road,
             &mut (&mut judge, recorder),
         )
         .map_err(SimError::from)?;

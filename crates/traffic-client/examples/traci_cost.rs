@@ -41,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (net, routes) = (folder.join("road.net.xml"), folder.join("bench.rou.xml"));
     let case = match case.as_str() {
         "prepare" => {
-            let network = convert(&Programs::find(None)?, &road, folder, &[])?;
+            let network = convert(&Programs::find(None)?, &road, folder, &[], &[])?;
             return Ok(std::fs::write(&routes, demand(&network, vehicles))?);
         }
         "native" => {

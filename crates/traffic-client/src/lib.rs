@@ -11,6 +11,7 @@ pub mod native;
 mod perception;
 mod philox;
 pub mod replay;
+pub mod schedule;
 mod search;
 pub mod serve;
 pub mod stats;

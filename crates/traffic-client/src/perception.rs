@@ -183,6 +183,8 @@ fn look(config: &PerceptionConfig, ego: &EgoState, n: &Neighbour, frame: i64) ->
             VehicleClass::Car => VehicleClass::Van,
             VehicleClass::Van => VehicleClass::Car,
             VehicleClass::Truck => VehicleClass::Van,
+            VehicleClass::Emergency => VehicleClass::Van,
+            VehicleClass::Barrier => VehicleClass::Car,
         }
     } else {
         n.class

@@ -60,12 +60,10 @@ struct Driver {
 impl Driver {
     fn of(class: VehicleClass) -> Self {
         match class {
-            VehicleClass::Car | VehicleClass::Van => {
-                Self { accel_m_s2: 1.4, decel_m_s2: 2.0, headway_s: 1.2, standstill_m: 2.0 }
-            }
             VehicleClass::Truck => {
                 Self { accel_m_s2: 0.6, decel_m_s2: 1.2, headway_s: 1.6, standstill_m: 3.0 }
             }
+            _ => Self { accel_m_s2: 1.4, decel_m_s2: 2.0, headway_s: 1.2, standstill_m: 2.0 },
         }
     }
 

@@ -8,13 +8,15 @@
 //! - target lane, behind, from the trailer's rear: `gap >= d_safe(other, ego)`, same bound;
 //! - own lane, ahead: `gap >= d_safe(ego, other)` as long as the ego's body reaches into the
 //!   other's.
+//!
+//! A lane in which an emergency vehicle comes from behind within [`KEEP_CLEAR_M`] counts as occupied.
 
 use super::rss::{RssConfig, SafeGap};
 use super::surroundings::{EgoExtent, in_lane, reaches};
 use crate::steering::LateralPath;
 use alloc::vec::Vec;
 use road::Road;
-use tractrix_core::{EgoState, LaneChangeRefusal, Neighbour, Scene, VehicleLimits};
+use tractrix_core::{EgoState, LaneChangeRefusal, Neighbour, Scene, VehicleClass, VehicleLimits};
 
 /// Present acceleration is held for so long, s.
 const HOLD_S: f64 = 1.5;
@@ -22,6 +24,8 @@ const HOLD_S: f64 = 1.5;
 const STEP_S: f64 = 0.5;
 /// Vehicles alongside within this distance of either bumper occupy the lane, m.
 const ALONGSIDE_M: f64 = 2.0;
+/// A lane is kept clear of the ego while an emergency vehicle comes in it from within this, m.
+const KEEP_CLEAR_M: f64 = 200.0;
 
 /// The ego's planned speed: constant acceleration to the end speed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -130,7 +134,11 @@ impl Gate {
         for n in &scene.neighbours {
             let ahead = n.front_s_m > extent.front_s_m;
             let role = if in_lane(road, target, n, extent.width_m) {
-                occupied |= n.front_s_m > extent.rear_s_m - ALONGSIDE_M
+                let behind_m = match n.class {
+                    VehicleClass::Emergency => KEEP_CLEAR_M,
+                    _ => ALONGSIDE_M,
+                };
+                occupied |= n.front_s_m > extent.rear_s_m - behind_m
                     && n.rear_s_m < extent.front_s_m + ALONGSIDE_M;
                 if ahead { Role::TargetAhead } else { Role::TargetBehind }
             } else if ahead && in_lane(road, own, n, extent.width_m) {

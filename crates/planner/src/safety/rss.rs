@@ -110,8 +110,8 @@ impl RssConfig {
     #[must_use]
     pub fn brake_max_m_s2(&self, class: VehicleClass) -> f64 {
         match class {
-            VehicleClass::Car | VehicleClass::Van => self.car_brake_max_m_s2,
             VehicleClass::Truck => self.truck_brake_max_m_s2,
+            _ => self.car_brake_max_m_s2,
         }
     }
 
@@ -119,8 +119,8 @@ impl RssConfig {
     #[must_use]
     pub fn behind(&self, class: VehicleClass) -> RearResponse {
         match class {
-            VehicleClass::Car | VehicleClass::Van => self.car_behind,
             VehicleClass::Truck => self.truck_behind,
+            _ => self.car_behind,
         }
     }
 }

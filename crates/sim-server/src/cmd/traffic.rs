@@ -9,7 +9,7 @@ use clap::{Parser, ValueEnum};
 use road::Road;
 use serde::Serialize;
 use sim::{Overrides, Scenario, Traffic, TrafficKind};
-use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
+use tractrix_core::{EgoState, Geometry, Time, TrafficSource, VehicleClass};
 use traffic_client::Mode;
 use traffic_client::calibrate::{Effort, Lesson, calibrate, drive_bounded};
 use traffic_client::native::{Boundary, TrafficConfig};
@@ -106,7 +106,6 @@ const RESULTS: &[&str] = &[
     "statistics.html",
     "traffic.manifest.toml",
     "calibrated.toml",
-    "calibrated-drivers.toml",
     "diagram.json",
     "diagram.html",
     "sumo",
@@ -188,6 +187,7 @@ pub(crate) struct Driven {
     pub(crate) lanes_m: f64,
     pub(crate) engine: String,
     pub(crate) mode: Mode,
+    pub(crate) arrivals: Option<sim::Arrivals>,
 }
 
 /// Why the traffic was not looked at any longer.
@@ -236,6 +236,8 @@ fn drive(
         }
         let now = Time::from_seconds(k as f64 * LOOK_S);
         let scene = traffic.advance(now, &ego).map_err(Failure::work)?;
+        let mut scene = scene.clone();
+        scene.neighbours.retain(|n| n.class != VehicleClass::Barrier);
         if rows.len() + scene.neighbours.len() > MOST_ROWS {
             output::note(&format!(
                 "traffic: ended at {} s, trajectories have {MOST_ROWS} rows at most",
@@ -244,7 +246,7 @@ fn drive(
             end = End::RowLimit;
             break;
         }
-        observer.look(scene, &road);
+        observer.look(&scene, &road);
         if k % 20 == 0 {
             stages.show(&format!("driving traffic: {:.0} of {duration_s:.0} s", now.seconds()));
         }
@@ -276,6 +278,7 @@ fn drive(
         lanes_m: traffic_client::calibrate::lanes_m(&road),
         engine: manifest.engine,
         mode: traffic.mode(),
+        arrivals: traffic.arrivals(),
     })
 }
 

@@ -46,6 +46,9 @@ impl Engine {
     /// The lane change that vehicle `i` has to make, if any.
     fn need(&self, i: usize) -> Option<Need> {
         let fleet = &self.state.fleet;
+        if let Some((side, distance_m)) = self.happening_need(i) {
+            return Some(Need { side, distance_m });
+        }
         let (lane, s, exit) = (fleet.lane[i], fleet.s_m[i], fleet.driver[i].exit);
         let here = &self.map.lanes[lane as usize];
         let ahead = self.config.mandatory_ahead_m;
@@ -118,7 +121,8 @@ impl Engine {
     /// What driver `i` would do about his lane in this tick.
     pub(super) fn wish(&self, i: usize) -> Option<Wish> {
         let fleet = &self.state.fleet;
-        if !is_due(self.state.tick, fleet.id[i]) || fleet.is_changing(i) || fleet.clock_s[i] < 0.0 {
+        let stays = fleet.is_changing(i) || fleet.driver[i].stop_s_m.is_finite();
+        if !is_due(self.state.tick, fleet.id[i]) || stays || fleet.clock_s[i] < 0.0 {
             return None;
         }
         let options = match self.need(i) {
@@ -196,6 +200,9 @@ impl Engine {
         let fleet = &self.state.fleet;
         let (lane, s) = (self.near.lanes[i][side], fleet.s_m[i]);
         if lane == NO_LANE || !self.map.is_open_to(lane, fleet.driver[i].exit) {
+            return None;
+        }
+        if self.keeps_out(i, lane) {
             return None;
         }
         let to = &self.map.lanes[lane as usize];

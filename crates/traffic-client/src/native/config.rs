@@ -10,6 +10,7 @@ use tractrix_core::VehicleClass;
 
 use super::human::HumanConfig;
 use crate::TrafficError;
+use crate::schedule::Schedule;
 
 /// Relative standard deviation of headways among drivers: between drivers on the same motorway it is
 /// about half the mean (Treiber & Kesting 2013, Fig. 4.8; Banks, Transp. Res. C 11 (2003) 189).
@@ -121,6 +122,9 @@ pub struct TrafficConfig {
     pub van: ClassConfig,
     /// Heavy trucks.
     pub truck: ClassConfig,
+    /// What changes while traffic runs; of the scenario, beside these figures.
+    #[serde(skip)]
+    pub schedule: Schedule,
 }
 
 impl Default for TrafficConfig {
@@ -206,6 +210,7 @@ impl Default for TrafficConfig {
             car,
             van,
             truck,
+            schedule: Schedule::default(),
         }
     }
 }
@@ -256,8 +261,8 @@ impl TrafficConfig {
     #[must_use]
     pub fn class(&self, class: VehicleClass) -> &ClassConfig {
         match class {
-            VehicleClass::Car => &self.car,
-            VehicleClass::Van => &self.van,
+            VehicleClass::Car | VehicleClass::Barrier => &self.car,
+            VehicleClass::Van | VehicleClass::Emergency => &self.van,
             VehicleClass::Truck => &self.truck,
         }
     }
@@ -341,6 +346,9 @@ impl TrafficConfig {
             ] {
                 check(format!("{name}.{key}"), value, low, high);
             }
+        }
+        if let Err(TrafficError::Config { why }) = self.schedule.validate(None) {
+            bad.push(why);
         }
         if bad.is_empty() { Ok(()) } else { Err(TrafficError::Config { why: bad.join("; ") }) }
     }

@@ -22,6 +22,8 @@ pub(crate) struct Driver {
     pub(crate) exit: u16,
     /// Station at which the vehicle leaves the road where no ramp is, m (measured traffic).
     pub(crate) leaves_s_m: f64,
+    /// Station at which its front stops and stays, m; infinite: nowhere.
+    pub(crate) stop_s_m: f64,
     pub(crate) class: VehicleClass,
 }
 
@@ -34,19 +36,24 @@ fn log_normal(sigma: f64, draw: f64) -> f64 {
     libm::exp(libm::sqrt(variance) * draw - 0.5 * variance)
 }
 
+/// Speed that an emergency vehicle wishes where nobody says another, m/s, and its power, W/kg.
+const EMERGENCY_M_S: f64 = 36.1;
+const EMERGENCY_W_KG: f64 = 40.0;
+
 impl Driver {
-    /// The driver of vehicle number `index`: the same for the same seed, whoever asks and when.
-    /// `exits` are the off-ramps ahead, nearest first.
+    /// The driver of vehicle number `index`: the same for the same seed, whoever asks and when, and
+    /// the same share of trucks. `exits` are the off-ramps ahead, nearest first.
     pub(crate) fn draw(
         config: &TrafficConfig,
+        truck_share_frac: f64,
         index: u64,
         exits: impl Iterator<Item = u16>,
     ) -> Self {
         let d = Draws::new(config.seed, Stream::Driver, index);
         let share = d.uniform(0);
-        let class = if share < config.truck_share_frac {
+        let class = if share < truck_share_frac {
             VehicleClass::Truck
-        } else if share < config.truck_share_frac + config.van_share_frac {
+        } else if share < truck_share_frac + config.van_share_frac {
             VehicleClass::Van
         } else {
             VehicleClass::Car
@@ -71,7 +78,7 @@ impl Driver {
             .enumerate()
             .find(|(n, _)| d.uniform(100 + *n as u32) < config.exit_share_frac)
             .map_or(NO_LANE, |(_, lane)| lane);
-        Self {
+        let mut driver = Self {
             idm: Idm::new(
                 config.max_speed_m_s * factor,
                 headway_s.max(LEAST_HEADWAY_S),
@@ -87,8 +94,21 @@ impl Driver {
             politeness_frac: c.politeness_frac,
             exit,
             leaves_s_m: f64::INFINITY,
+            stop_s_m: f64::INFINITY,
             class,
+        };
+        if class == VehicleClass::Emergency {
+            driver.rushes(EMERGENCY_M_S);
         }
+        driver
+    }
+
+    /// Makes it a driver with right of way: no limit but the speed wished (m/s), in a hurry.
+    pub(crate) fn rushes(&mut self, speed_m_s: f64) {
+        let idm = &self.idm;
+        self.idm = Idm::new(speed_m_s, 1.0, idm.min_gap_m, 2.0, 3.0, idm.max_decel_m_s2);
+        (self.limit_factor, self.politeness_frac) = (f64::INFINITY, 0.0);
+        self.power_w_kg = self.power_w_kg.max(EMERGENCY_W_KG);
     }
 
     /// The acceleration that the engine allows, m/s²: `P/(m v) - g (sin θ + f cos θ) - k v²`. It is
@@ -113,11 +133,12 @@ mod tests {
     #[test]
     fn a_driver_depends_on_seed_and_number_alone() {
         let c = TrafficConfig::default();
-        let a: Vec<_> = (0..50).map(|i| Driver::draw(&c, i, [3u16, 4].into_iter())).collect();
-        let b: Vec<_> = (0..50).rev().map(|i| Driver::draw(&c, i, [3u16, 4].into_iter())).collect();
+        let a: Vec<_> = (0..50).map(|i| Driver::draw(&c, 0.2, i, [3u16, 4].into_iter())).collect();
+        let b: Vec<_> =
+            (0..50).rev().map(|i| Driver::draw(&c, 0.2, i, [3u16, 4].into_iter())).collect();
         assert!(a.iter().eq(b.iter().rev()));
         let other = TrafficConfig { seed: 2, ..c };
-        assert_ne!(a[0], Driver::draw(&other, 0, [3u16, 4].into_iter()));
+        assert_ne!(a[0], Driver::draw(&other, 0.2, 0, [3u16, 4].into_iter()));
     }
 
     #[test]
@@ -125,7 +146,7 @@ mod tests {
         let c = TrafficConfig::default();
         let n = 20_000;
         let trucks = (0..n)
-            .filter(|&i| Driver::draw(&c, i, std::iter::empty()).class == VehicleClass::Truck)
+            .filter(|&i| Driver::draw(&c, 0.2, i, std::iter::empty()).class == VehicleClass::Truck)
             .count();
         assert!((trucks as f64 / n as f64 - 0.2).abs() < 0.01);
     }

@@ -16,6 +16,7 @@ use super::config::{ClassConfig, TrafficConfig};
 use super::driver::Driver;
 use super::ego::EgoSpans;
 use super::fleet::Fleet;
+use super::happenings::{Block, Plot, Rushing};
 use super::human::Minds;
 use super::lanes::{LaneMap, NO_LANE};
 use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT, Seen};
@@ -53,6 +54,8 @@ pub(crate) struct State {
     pub(crate) driven_m: f64,
     /// Lane changes begun.
     pub(crate) lane_changes: u64,
+    /// What has happened so far.
+    pub(crate) plot: Plot,
 }
 
 impl Clone for State {
@@ -72,6 +75,7 @@ impl Clone for State {
         self.late.clone_from(&from.late);
         self.driven_m = from.driven_m;
         self.lane_changes = from.lane_changes;
+        self.plot.clone_from(&from.plot);
     }
 }
 
@@ -97,6 +101,12 @@ pub(crate) struct Engine {
     /// Who does the pieces of a tick, and how many vehicles a piece has.
     pub(super) workers: Arc<dyn Workers>,
     pub(super) piece: usize,
+    /// Speed limit of the whole road at this tick, m/s.
+    pub(super) limit_m_s: f64,
+    /// Stretches that are in the way at this tick.
+    pub(super) blocks: Vec<Block>,
+    /// Emergency vehicles at this tick.
+    pub(super) rushing: Vec<Rushing>,
 }
 
 /// What moving a piece gave.
@@ -130,12 +140,16 @@ impl Engine {
             workers: Arc::new(InTurn),
             piece: PIECE,
             ego_driver: Idm::new(25.0, 1.5, 3.0, 0.6, 1.5, 6.0),
+            limit_m_s: f64::INFINITY,
+            blocks: Vec::new(),
+            rushing: Vec::new(),
         }
     }
 
     /// Fixes the accelerations and begins lane changes; the ego spans are those of this instant.
     pub(crate) fn decide(&mut self) {
         self.look_beyond();
+        self.happen();
         let workers = Arc::clone(&self.workers);
         let piece = self.piece;
         self.find_neighbours(&*workers, piece);
@@ -167,11 +181,13 @@ impl Engine {
 
     fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize) {
         let (fleet, map, tick) = (&self.state.fleet, &*self.map, self.state.tick);
+        let eventful = !self.blocks.is_empty() || !self.rushing.is_empty();
         let looks_aside = |i: usize| {
             is_due(tick, fleet.id[i])
                 || fleet.is_changing(i)
                 || fleet.driver[i].exit != NO_LANE
                 || map.ends_early(fleet.lane[i])
+                || eventful
         };
         self.near.find(Seen { fleet, map, ego: &self.ego }, workers, piece, looks_aside);
     }
@@ -201,7 +217,7 @@ impl Engine {
         let (s_m, v) = (fleet.s_m[i], fleet.v_m_s[i]);
         let lane_map = &self.map.lanes[lane as usize];
         let driver = &fleet.driver[i];
-        let mut wish_m_s = lane_map.limit_m_s(s_m) * driver.limit_factor;
+        let mut wish_m_s = lane_map.limit_m_s(s_m).min(self.limit_m_s) * driver.limit_factor;
         if s_m > self.map.s_end_m - BEYOND_M
             && let Some(&beyond_m_s) = self.beyond_m_s.get(lane as usize)
         {
@@ -264,6 +280,9 @@ impl Engine {
             let v = fleet.v_m_s[i];
             let gap = self.map.lanes[driven as usize].s_end_m - END_MARGIN_M - fleet.s_m[i];
             a = a.min(fleet.driver[i].idm.interaction_m_s2(v, gap, v));
+        }
+        if !self.blocks.is_empty() {
+            a = a.min(self.closure_m_s2(i, driven, END_MARGIN_M)).min(self.stop_m_s2(i));
         }
         fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, driven), a)
     }

@@ -24,7 +24,9 @@ impl Engine {
     }
 
     fn draw(&self, id: u64, s_m: f64) -> Driver {
-        Driver::draw(&self.config, id, self.exits_after(s_m))
+        let share = self.config.schedule.at(self.time_s(), None, |step| step.truck_share_frac);
+        let share = share.unwrap_or(self.config.truck_share_frac);
+        Driver::draw(&self.config, share, id, self.exits_after(s_m))
     }
 
     /// Fills the through lanes with the configured density. Spacings vary by a factor; where they
@@ -74,14 +76,7 @@ impl Engine {
     /// Draws this tick's arrivals and lets in whom the traffic has room for.
     pub(crate) fn let_in(&mut self) {
         for k in 0..self.map.lanes.len() {
-            let lane = &self.map.lanes[k];
-            let probability = match lane.usage {
-                LaneUse::Through if lane.s_start_m < self.map.s_start_m + 1.0 => {
-                    self.config.spawn_probability
-                }
-                LaneUse::Entry => self.config.ramp_spawn_probability,
-                _ => continue,
-            } * (TICK_S / self.config.spawn_interval_s);
+            let Some(probability) = self.arrival_probability(k as u16) else { continue };
             let draws = Draws::new(self.config.seed, Stream::Arrival, self.state.tick);
             if draws.uniform(k as u32) < probability {
                 self.state.arrived += 1;
@@ -93,24 +88,34 @@ impl Engine {
         }
     }
 
+    /// Probability that somebody comes to an entry in this tick; `None`: the lane is none.
+    fn arrival_probability(&self, k: u16) -> Option<f64> {
+        let lane = &self.map.lanes[k as usize];
+        let (config, time_s) = (&self.config, self.time_s());
+        let (probability, changed) = match lane.usage {
+            LaneUse::Through if lane.s_start_m < self.map.s_start_m + 1.0 => {
+                let flow = config.schedule.at(time_s, Some(k), |step| step.flow_veh_h_lane);
+                (config.spawn_probability, flow)
+            }
+            LaneUse::Entry => {
+                let flow = config.schedule.at(time_s, Some(k), |step| step.ramp_flow_veh_h);
+                (config.ramp_spawn_probability, flow)
+            }
+            _ => return None,
+        };
+        let usual = probability * (TICK_S / config.spawn_interval_s);
+        Some(changed.map_or(usual, |flow_veh_h| flow_veh_h * TICK_S / 3600.0))
+    }
+
     /// Lets the next vehicle into a lane if there is room for it.
     fn enter(&mut self, k: u16) -> bool {
         let lane = &self.map.lanes[k as usize];
         let id = self.state.next_id;
         let driver = self.draw(id, lane.s_start_m);
         let s_m = lane.s_start_m + driver.length_m;
-        let desired = driver.idm.desired_speed_m_s.min(lane.limit_m_s(s_m) * driver.limit_factor);
-        let fleet = &self.state.fleet;
-        let from = fleet.s_m.partition_point(|&s| s < lane.s_start_m);
-        let mut ahead = (from..fleet.len())
-            .find(|&i| fleet.occupies(i, k))
-            .map(|i| (fleet.rear_m(i), fleet.v_m_s[i]));
-        if let Some(span) = self.ego.in_lane(k)
-            && span.front_m >= lane.s_start_m
-            && ahead.is_none_or(|(rear_m, _)| span.rear_m < rear_m)
-        {
-            ahead = Some((span.rear_m, self.ego.speed_m_s));
-        }
+        let limit_m_s = lane.limit_m_s(s_m).min(self.limit_m_s);
+        let desired = driver.idm.desired_speed_m_s.min(limit_m_s * driver.limit_factor);
+        let ahead = self.leader_at(k, lane.s_start_m);
         let queued = match lane.usage {
             LaneUse::Through => self.before_m_s(k),
             _ => None,
@@ -123,6 +128,17 @@ impl Engine {
         self.state.next_id += 1;
         true
     }
+
+    /// Rear (station, m) and speed (m/s) of whoever is first in a lane from a station on.
+    pub(super) fn leader_at(&self, lane: u16, s_m: f64) -> Option<(f64, f64)> {
+        let fleet = &self.state.fleet;
+        let from = fleet.s_m.partition_point(|&s| s < s_m);
+        let first = (from..fleet.len()).find(|&i| fleet.occupies(i, lane));
+        let ahead = first.map(|i| (fleet.rear_m(i), fleet.v_m_s[i]));
+        let ego = self.ego.in_lane(lane).filter(|span| span.front_m >= s_m);
+        let ego = ego.filter(|span| ahead.is_none_or(|(rear_m, _)| span.rear_m < rear_m));
+        ego.map_or(ahead, |span| Some((span.rear_m, self.ego.speed_m_s)))
+    }
 }
 
 /// Speed at which a driver comes in behind a leader (station of its rear, m, and speed, m/s);
@@ -132,7 +148,7 @@ impl Engine {
 /// having come in, so that no queue forms on the road that the road does not make itself. Where that
 /// speed would be below the one at which most get through, and below the leader's, they let the gap
 /// grow: out of a queue before the road comes as much as a lane carries.
-fn entry_speed_m_s(
+pub(super) fn entry_speed_m_s(
     driver: &Driver,
     wished_m_s: f64,
     desired_m_s: f64,

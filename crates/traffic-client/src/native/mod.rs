@@ -9,6 +9,7 @@ mod engine;
 mod equilibrium;
 mod fleet;
 mod from_road;
+mod happenings;
 mod human;
 mod inflow;
 mod lanes;
@@ -28,6 +29,7 @@ pub use human::HumanConfig;
 pub(crate) use lanes::LaneMap;
 pub(crate) use publish::carry_on;
 pub use source::{NativeCounts, NativeSnapshot, NativeTraffic};
+pub(crate) use takeover::stopping_gap_m;
 pub use workers::{InTurn, Piece, Workers};
 
 #[cfg(test)]

@@ -235,7 +235,7 @@ fn drivers_slow_down_before_a_lower_limit_and_not_after_it() {
     let config = TrafficConfig { spawn_probability: 0.0, max_speed_m_s: 33.0, ..demand(0.0, 0.0) };
     for number in 0..20 {
         let mut e = engine(config.clone(), map.clone());
-        let driver = Driver::draw(&e.config, number, std::iter::empty());
+        let driver = Driver::draw(&e.config, e.config.truck_share_frac, number, std::iter::empty());
         let wish = (33.0 * driver.limit_factor).min(driver.idm.desired_speed_m_s);
         e.state.fleet.insert(100.0, wish, 0, number, driver);
         let (mut at_sign, mut hardest) = (0.0, 0.0f64);
@@ -259,7 +259,7 @@ fn a_follower_who_misjudges_keeps_his_gap_on_average() {
     let mut config = TrafficConfig { spawn_probability: 0.0, ..demand(0.0, 0.0) };
     config.human.closing_error_1_s = 0.0;
     let mut e = engine(config, LaneMap::straight(1, 1e5, 3.75, 30.0));
-    let mut follower = Driver::draw(&e.config, 1, std::iter::empty());
+    let mut follower = Driver::draw(&e.config, e.config.truck_share_frac, 1, std::iter::empty());
     let mut leader = follower;
     leader.idm.desired_speed_m_s = 15.0;
     follower.idm.desired_speed_m_s = 30.0;

@@ -76,6 +76,8 @@ pub(crate) fn publish(engine: &Engine, road: &Road, ego_s_m: f64, tau_s: f64, sc
     scene
         .neighbours
         .sort_unstable_by(|a, b| a.front_s_m.total_cmp(&b.front_s_m).then(a.id.cmp(&b.id)));
+    let schedule = &engine.config.schedule;
+    engine.state.plot.stage().show(schedule, road, ego_s_m, radius_m, scene);
 }
 
 /// A neighbour `tau_s` later, carried on with its speed and acceleration in the direction of its

@@ -29,6 +29,10 @@ impl Engine {
     /// The speed at which traffic moves before the start of the road at this tick, m/s; `None`:
     /// as its drivers wish.
     pub(super) fn before_m_s(&self, lane: u16) -> Option<f64> {
+        let schedule = &self.config.schedule;
+        if let Some(v) = schedule.at(self.time_s(), Some(lane), |step| step.inflow_speed_m_s) {
+            return Some(v.max(1.0));
+        }
         let mean_m_s = self.config.inflow_speed_m_s?;
         Some(self.around(mean_m_s, self.config.inflow_sigma_m_s, Stream::Inflow, lane).max(1.0))
     }

@@ -62,10 +62,12 @@ impl NativeTraffic {
         config: TrafficConfig,
     ) -> Result<Self, TrafficError> {
         config.validate()?;
+        config.schedule.validate(Some(&road))?;
         let map = super::from_road::lane_map(&road)?;
         let warm_up = (config.warm_up_s / TICK_S) as u64;
         let mut engine = Engine::new(Arc::new(config), Arc::new(map));
         engine.fill();
+        engine.state.plot.begin(warm_up, 0.0, &engine.config.schedule);
         for _ in 0..warm_up {
             engine.decide();
             engine.commit();
@@ -91,6 +93,9 @@ impl NativeTraffic {
         ego.check_finite()?;
         let mut traffic = Self::new(road, geometry, config)?;
         let first = traffic.engine.adopt(scene, ego.s_m);
+        let engine = &mut traffic.engine;
+        let (tick, time_s) = (engine.state.tick, scene.time.seconds());
+        engine.state.plot.begin(tick, time_s, &engine.config.schedule);
         traffic.see_ego(ego, now, scene.time);
         traffic.engine.clear_around_ego(first);
         traffic.tick_start = Some(scene.time);
@@ -209,6 +214,7 @@ impl TrafficSource for NativeTraffic {
             None => {
                 self.see_ego(ego, now, now);
                 self.engine.clear_around_ego(0);
+                self.engine.state.plot.start = (self.engine.state.tick, now.seconds());
                 self.engine.decide();
                 now
             }

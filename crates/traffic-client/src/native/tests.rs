@@ -202,7 +202,7 @@ fn trucks_slow_down_on_a_4_percent_climb_to_the_speed_that_their_power_gives() {
         LaneMap::new(flat.lanes.clone(), 0.0, 6000.0, &|s| if s > 2000.0 { grade } else { 0.0 });
     let mut e = engine(config, climb);
     for number in 0..8 {
-        let driver = Driver::draw(&e.config, number, std::iter::empty());
+        let driver = Driver::draw(&e.config, e.config.truck_share_frac, number, std::iter::empty());
         e.state.fleet = Fleet::default();
         e.state.fleet.insert(100.0, 20.0, 0, number, driver);
         let mut at_the_foot = 0.0;
@@ -290,7 +290,7 @@ fn a_follower_reacts_as_soon_as_the_flank_of_the_ego_enters_its_lane() {
         },
         LaneMap::straight(2, 3000.0, 3.75, 36.0),
     );
-    let mut driver = Driver::draw(&e.config, 0, std::iter::empty());
+    let mut driver = Driver::draw(&e.config, e.config.truck_share_frac, 0, std::iter::empty());
     driver.idm = Idm::new(34.0, 1.4, 2.0, 1.4, 2.0, 8.0);
     driver.class = tractrix_core::VehicleClass::Car;
     driver.power_w_kg = 60.0;

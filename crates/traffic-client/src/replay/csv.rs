@@ -308,6 +308,8 @@ pub(crate) fn class(text: &str) -> Option<VehicleClass> {
     match text.as_str() {
         "car" | "passenger" | "2" | "1" | "motorcycle" => Some(VehicleClass::Car),
         "van" | "delivery" => Some(VehicleClass::Van),
+        "emergency" => Some(VehicleClass::Emergency),
+        "barrier" => Some(VehicleClass::Barrier),
         "truck" | "bus" | "trailer" | "3" => Some(VehicleClass::Truck),
         _ => None,
     }

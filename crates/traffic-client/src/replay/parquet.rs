@@ -151,5 +151,7 @@ fn class_name(class: VehicleClass) -> &'static str {
         VehicleClass::Car => "car",
         VehicleClass::Van => "van",
         VehicleClass::Truck => "truck",
+        VehicleClass::Emergency => "emergency",
+        VehicleClass::Barrier => "barrier",
     }
 }

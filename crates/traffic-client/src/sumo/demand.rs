@@ -7,14 +7,18 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use road::Road;
 use tractrix_core::{Geometry, VehicleClass};
 
 use super::config::SumoConfig;
 use super::network::Network;
+use super::odd::{Entries, Kept, closed_from_the_start, emergency_vehicles, stopped_vehicles};
 use crate::native::{ClassConfig, TrafficConfig};
 use crate::philox::{Draws, Stream};
 use crate::replay::class_of_length;
 
+/// Types of emergency vehicles begin with this.
+pub(super) const EMERGENCY: &str = "emergency";
 /// Id of the ego in SUMO, and of its type.
 pub(crate) const EGO: &str = "ego";
 /// Id of the vehicle that stands for the ego in a neighbour lane.
@@ -37,6 +41,9 @@ pub(crate) fn is_type(name: &str) -> bool {
 
 /// The class behind a type id: ours by its name, another by the vehicle's length.
 pub(crate) fn class_of(type_id: &str, length_m: f64) -> VehicleClass {
+    if type_id.starts_with(EMERGENCY) {
+        return VehicleClass::Emergency;
+    }
     CLASSES
         .iter()
         .find(|(_, name, _)| type_id.starts_with(name))
@@ -48,6 +55,7 @@ pub(crate) fn class_of(type_id: &str, length_m: f64) -> VehicleClass {
 pub(crate) fn route_file(
     sumo: &SumoConfig,
     network: &Network,
+    road: &Road,
     geometry: &Geometry,
     free_m: std::ops::Range<f64>,
 ) -> String {
@@ -57,6 +65,7 @@ pub(crate) fn route_file(
         VehicleClass::Car => 1.0 - config.van_share_frac - config.truck_share_frac,
         VehicleClass::Van => config.van_share_frac,
         VehicleClass::Truck => config.truck_share_frac,
+        _ => 0.0,
     };
     let _ = writeln!(out, "<vTypeDistribution id=\"mix\">");
     for (class, name, v_class) in CLASSES {
@@ -64,6 +73,16 @@ pub(crate) fn route_file(
         vehicle_type(&mut out, name, v_class, config.class(class), share(class), extra);
     }
     let _ = writeln!(out, "</vTypeDistribution>");
+    for (k, step) in config.schedule.demand.iter().enumerate() {
+        let Some(trucks) = step.truck_share_frac else { continue };
+        let vans = config.van_share_frac.min(1.0 - trucks);
+        let _ = writeln!(
+            out,
+            "<vTypeDistribution id=\"mix{k}\" vTypes=\"car van truck\" \
+             probabilities=\"{} {vans} {trucks}\"/>",
+            (1.0 - trucks - vans).max(0.0)
+        );
+    }
     if config.sees_ego {
         let _ = writeln!(
             out,
@@ -81,10 +100,16 @@ pub(crate) fn route_file(
         let id = if k == 0 { EGO_ROUTE.to_owned() } else { format!("route{k}") };
         let _ = writeln!(out, "<route id=\"{id}\" edges=\"{}\"/>", route.join(" "));
     }
+    // SUMO reads departures in order of their times.
+    let mut entries = Entries::default();
     if let Some(through) = routes.first() {
-        fill(&mut out, config, network, through, &free_m);
+        let mut kept = stopped_vehicles(&mut entries, config, network, road, through);
+        kept.extend(closed_from_the_start(config, network, road));
+        fill(&mut entries, config, network, through, &free_m, &kept);
+        emergency_vehicles(&mut out, &mut entries, config, network, through);
     }
-    flows(&mut out, config, network, &routes);
+    flows(&mut entries, config, network, &routes);
+    out.push_str(&entries.in_order());
     out.push_str("</routes>\n");
     out
 }
@@ -125,11 +150,12 @@ fn vehicle_type(
 
 /// Vehicles at the start, spaced as in native traffic, along the through route.
 fn fill(
-    out: &mut String,
+    entries: &mut Entries,
     config: &TrafficConfig,
     network: &Network,
     through: &[String],
     free_m: &std::ops::Range<f64>,
+    kept: &[Kept],
 ) {
     let density = config.start_density_1_km();
     if density <= 0.0 {
@@ -158,7 +184,8 @@ fn fill(
                 if at_m > length_m {
                     break;
                 }
-                if !free_m.contains(&(begin_m + at_m)) {
+                let is_free = !kept.iter().any(|kept| kept.holds(&lane.id, at_m));
+                if is_free && !free_m.contains(&(begin_m + at_m)) {
                     row.push((at_m, name, own, number));
                 }
             }
@@ -169,46 +196,68 @@ fn fill(
                 });
                 let wish_m_s = 0.9 * lane.speed_m_s.min(config.max_speed_m_s);
                 let speed = wish_m_s.min(keeps_m_s).max(0.0);
-                let _ = writeln!(
-                    out,
+                let text = format!(
                     "<vehicle id=\"fill{number}\" type=\"{name}\" depart=\"0\" departLane=\"{}\" \
                      departPos=\"{at_m:.2}\" departSpeed=\"{speed:.2}\" insertionChecks=\"none\">\
                      <route edges=\"{rest}\"/></vehicle>",
                     lane.index
                 );
+                entries.push(0.0, text);
             }
         }
         begin_m += length_m;
     }
 }
 
-/// Inflow at every entry, lane by lane, split over the routes that begin there.
-fn flows(out: &mut String, config: &TrafficConfig, network: &Network, routes: &[Vec<String>]) {
+/// Inflow at every entry, lane by lane and step of the demand by step, split over the routes that
+/// begin there.
+fn flows(entries: &mut Entries, config: &TrafficConfig, network: &Network, routes: &[Vec<String>]) {
     let through = routes.first().and_then(|route| route.first());
+    let schedule = &config.schedule;
+    let mut times_s: Vec<f64> = vec![0.0];
+    times_s.extend(schedule.demand.iter().map(|step| step.from_s.max(0.0)));
+    times_s.sort_by(f64::total_cmp);
+    times_s.dedup();
     for (k, route) in routes.iter().enumerate() {
         let Some(entry) = route.first() else { continue };
         let siblings = routes.iter().filter(|r| r.first() == Some(entry)).count();
         let is_longest = routes.iter().position(|r| r.first() == Some(entry)) == Some(k);
         let out_share = config.exit_share_frac.min(1.0 / siblings as f64);
         let share = if is_longest { 1.0 - out_share * (siblings - 1) as f64 } else { out_share };
-        let probability = if Some(entry) == through {
-            config.spawn_probability
-        } else {
-            config.ramp_spawn_probability
-        };
-        // Per second, as SUMO wants it.
-        let per_s = (share * probability / config.spawn_interval_s).min(1.0);
-        if per_s <= 0.0 {
-            continue;
-        }
+        let id = if k == 0 { EGO_ROUTE.to_owned() } else { format!("route{k}") };
         for lane in network.lanes_of(entry) {
-            let id = if k == 0 { EGO_ROUTE.to_owned() } else { format!("route{k}") };
-            let _ = writeln!(
-                out,
-                "<flow id=\"flow{k}_{}\" type=\"mix\" route=\"{id}\" begin=\"0\" end=\"{FOREVER_S}\" \
-                 probability=\"{per_s}\" departLane=\"{}\" departSpeed=\"max\"/>",
-                lane.index, lane.index
-            );
+            let track = lane.original.first().and_then(|id| id.parse().ok());
+            for (step, &from_s) in times_s.iter().enumerate() {
+                let (probability, flow) = if Some(entry) == through {
+                    let flow = schedule.at(from_s, track, |step| step.flow_veh_h_lane);
+                    (config.spawn_probability, flow)
+                } else {
+                    let flow = schedule.at(from_s, track, |step| step.ramp_flow_veh_h);
+                    (config.ramp_spawn_probability, flow)
+                };
+                // Per second, as SUMO wants it.
+                let usual = probability / config.spawn_interval_s;
+                let per_s = (share * flow.map_or(usual, |veh_h| veh_h / 3600.0)).min(1.0);
+                if per_s <= 0.0 {
+                    continue;
+                }
+                let last = |s: &crate::schedule::DemandStep| s.from_s <= from_s;
+                let with_trucks = |s: &crate::schedule::DemandStep| s.truck_share_frac.is_some();
+                let mix = schedule.demand.iter().rposition(|s| last(s) && with_trucks(s));
+                let mix = mix.map_or("mix".to_owned(), |k| format!("mix{k}"));
+                let speed = schedule.at(from_s, track, |step| step.inflow_speed_m_s);
+                let speed = speed.map_or("max".to_owned(), |v| format!("{v:.2}"));
+                let end = times_s.get(step + 1).map_or(FOREVER_S.to_owned(), f64::to_string);
+                let index = lane.index;
+                entries.push(
+                    from_s,
+                    format!(
+                        "<flow id=\"flow{k}_{index}_{step}\" type=\"{mix}\" route=\"{id}\" \
+                         begin=\"{from_s}\" end=\"{end}\" probability=\"{per_s}\" \
+                         departLane=\"{index}\" departSpeed=\"{speed}\"/>"
+                    ),
+                );
+            }
         }
     }
 }

@@ -12,6 +12,7 @@ mod demand;
 mod error;
 pub mod link;
 pub mod network;
+mod odd;
 mod plain;
 pub mod process;
 pub mod session;

@@ -56,8 +56,8 @@ pub struct Network {
     pub next: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// Brings a road into SUMO: writes plain files into `folder`, runs netconvert with
-/// these further options, reads the result.
+/// Brings a road into SUMO: writes plain files into `folder`, with edges cut at these further
+/// stations, runs netconvert with these further options, reads the result.
 ///
 /// # Errors
 /// [`SumoError::NetConvert`] with its words, [`SumoError::Map`] if its output is unusable,
@@ -66,9 +66,10 @@ pub fn convert(
     programs: &Programs,
     road: &Road,
     folder: &Path,
+    further_cuts_m: &[f64],
     options: &[String],
 ) -> Result<Network, SumoError> {
-    let text = plain(road);
+    let text = plain(road, further_cuts_m);
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
         std::fs::write(&path, text).map_err(|e| file_error(&path, &e)).map(|()| path)
@@ -184,6 +185,21 @@ fn read_lane(edge: &str, node: roxmltree::Node<'_, '_>) -> Result<SumoLane, Sumo
         shape_m,
         id: id.clone(),
     })
+}
+
+impl SumoLane {
+    /// Whether it stands for a lane track.
+    #[must_use]
+    pub fn is_of(&self, track: u16) -> bool {
+        self.original.iter().any(|id| id.parse() == Ok(track))
+    }
+
+    /// Stations of its ends, m, on the road that it was made of.
+    #[must_use]
+    pub fn stretch_m(&self, road: &Road) -> Option<(f64, f64)> {
+        let at = |point: Option<&[f64; 2]>| point.and_then(|p| road.project(p[0], p[1], None));
+        Some((at(self.shape_m.first())?.s_m, at(self.shape_m.last())?.s_m))
+    }
 }
 
 impl Network {

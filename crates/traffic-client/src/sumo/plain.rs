@@ -42,9 +42,9 @@ struct Group {
     tracks: Vec<u16>,
 }
 
-/// Writes the road.
-pub(crate) fn plain(road: &Road) -> Plain {
-    let cuts = cuts(road);
+/// Writes the road, with further cuts at these stations, m.
+pub(crate) fn plain(road: &Road, further_m: &[f64]) -> Plain {
+    let cuts = cuts(road, further_m);
     let stretches: Vec<Vec<Group>> =
         cuts.windows(2).map(|w| groups(road, w.first(), w.last())).collect();
     let mut out = Plain {
@@ -147,9 +147,10 @@ impl Plain {
 }
 
 /// Stations at which the road is cut, both ends included.
-fn cuts(road: &Road) -> Vec<f64> {
+fn cuts(road: &Road, further_m: &[f64]) -> Vec<f64> {
     let length_m = road.length_m();
     let mut wanted: Vec<f64> = road.section_starts_m().collect();
+    wanted.extend(further_m);
     wanted.extend(road.speed_limits().iter().map(|limit| limit.0));
     wanted.extend(road.lanes().iter().flat_map(|l| l.speed_limits.iter().map(|limit| limit.0)));
     let neighbours = |s: f64| -> Vec<(u16, Option<u16>)> {
@@ -201,7 +202,7 @@ mod tests {
     #[test]
     fn the_highway_becomes_edges_whose_lanes_lead_on_into_the_same_track() {
         let road = road::builtin::highway();
-        let text = plain(&road);
+        let text = plain(&road, &[]);
         let document = roxmltree::Document::parse(&text.edges).unwrap();
         let mut track = BTreeMap::new();
         for edge in document.root_element().children().filter(|n| n.has_tag_name("edge")) {

@@ -81,6 +81,8 @@ pub mod var {
     pub const LIGHT_STATE: u8 = 0x20;
     /// Program of a traffic light.
     pub const LIGHT_PROGRAM: u8 = 0x29;
+    /// Vehicle classes that a lane is closed to.
+    pub const DISALLOWED: u8 = 0x35;
     /// Add a vehicle.
     pub const ADD: u8 = 0x85;
     /// Remove a vehicle.

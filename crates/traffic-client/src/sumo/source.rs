@@ -22,6 +22,7 @@ use super::session::Answer;
 use super::shown::Body;
 use crate::TrafficError;
 use crate::native::{EgoSpans, LaneMap, lane_map};
+use crate::schedule::{IncidentKind, Stage};
 
 /// SUMO's step, ns.
 const STEP_NS: i64 = 100_000_000;
@@ -49,6 +50,10 @@ pub struct SumoTraffic {
     pub(super) step_time: Option<Time>,
     pub(super) scene: Scene,
     pub(super) restarts: u32,
+    /// Closed lanes.
+    pub(super) stage: Stage,
+    /// Speed limit of the whole road that SUMO was told, m/s.
+    pub(super) limit_m_s: f64,
 }
 
 impl SumoTraffic {
@@ -64,9 +69,13 @@ impl SumoTraffic {
         folder: &Path,
     ) -> Result<Self, TrafficError> {
         config.traffic.validate()?;
+        config.traffic.schedule.validate(Some(&road))?;
         config.check_files_and_types()?;
         let programs = Programs::find(config.binary.as_deref())?;
-        let network = convert(&programs, &road, folder, &config.netconvert_options)?;
+        let closures = config.traffic.schedule.incidents.iter();
+        let closures = closures.filter(|i| i.kind == IncidentKind::ClosedLane);
+        let cuts_m: Vec<f64> = closures.flat_map(|i| <[f64; 2]>::from(i.stretch_m())).collect();
+        let network = convert(&programs, &road, folder, &cuts_m, &config.netconvert_options)?;
         let import = check(&network, &road)?;
         let map = lane_map(&road)?;
         Ok(Self {
@@ -87,6 +96,8 @@ impl SumoTraffic {
             step_time: None,
             scene: Scene::default(),
             restarts: 0,
+            stage: Stage::default(),
+            limit_m_s: f64::INFINITY,
         })
     }
 
@@ -226,7 +237,7 @@ impl TrafficSource for SumoTraffic {
             Some(at) => at,
             None => {
                 self.start(ego)?;
-                self.step(ego)?;
+                self.step(ego, now)?;
                 self.learn()?;
                 self.take_over();
                 now
@@ -241,8 +252,8 @@ impl TrafficSource for SumoTraffic {
             return Err(TrafficError::TimeJump { asked_s, reached_s });
         }
         while now.0 - at.0 >= STEP_NS {
-            self.step(ego)?;
             at = at.plus_nanos(STEP_NS);
+            self.step(ego, at)?;
             self.learn()?;
             self.take_over();
         }
@@ -254,6 +265,9 @@ impl TrafficSource for SumoTraffic {
         self.scene
             .neighbours
             .sort_unstable_by(|a, b| a.front_s_m.total_cmp(&b.front_s_m).then(a.id.cmp(&b.id)));
+        let traffic = &self.config.traffic;
+        let radius_m = traffic.scene_radius_m;
+        self.stage.show(&traffic.schedule, &self.road, ego.s_m, radius_m, &mut self.scene);
         Ok(&self.scene)
     }
 }

@@ -3,7 +3,7 @@
 //! SUMO's drivers do not see an externally moved truck before its centre crosses a lane line. While
 //! the ego reaches into a neighbour lane, a *ghost* of its size drives in that lane.
 
-use tractrix_core::EgoState;
+use tractrix_core::{EgoState, Time};
 
 use super::codec::Value;
 use super::demand::{EGO, EGO_ROUTE, GHOST, route_file};
@@ -12,6 +12,7 @@ use super::link::Link;
 use super::network::file_error;
 use super::session::{id, var};
 use super::source::SumoTraffic;
+use crate::schedule::{Incident, IncidentKind, Stage};
 
 /// Id of the point of interest that the context subscription hangs on.
 const EYE: &str = "eye";
@@ -29,7 +30,7 @@ impl SumoTraffic {
             let path = self.folder.join(name);
             std::fs::write(&path, text).map_err(|e| file_error(&path, &e))
         };
-        let demand = route_file(&self.config, &self.network, &self.geometry, free);
+        let demand = route_file(&self.config, &self.network, &self.road, &self.geometry, free);
         write("demand.rou.xml", &demand)?;
         write(
             "eye.add.xml",
@@ -45,6 +46,7 @@ impl SumoTraffic {
             }
         }
         (self.ego_inside, self.ghost) = (false, false);
+        (self.stage, self.limit_m_s) = (Stage::default(), f64::INFINITY);
         self.bodies.clear();
         let speed_m_s = self.config.traffic.max_speed_m_s;
         let radius_m = self.config.traffic.scene_radius_m;
@@ -57,8 +59,9 @@ impl SumoTraffic {
         link.command("start", EYE)
     }
 
-    /// One step: the ego as it will be at its end, if it is to be seen.
-    pub(super) fn step(&mut self, ego: &EgoState) -> Result<(), SumoError> {
+    /// One step to a time: the ego as it will be at its end, if it is to be seen, and what changes.
+    pub(super) fn step(&mut self, ego: &EgoState, to: Time) -> Result<(), SumoError> {
+        let orders = self.orders(ego, to.seconds());
         let yaw = ego.yaw_rad;
         let (sin, cos) = (libm::sin(yaw), libm::cos(yaw));
         let front = (ego.x_m + self.geometry.front_m * cos, ego.y_m + self.geometry.front_m * sin);
@@ -66,6 +69,9 @@ impl SumoTraffic {
         let ghost = if sees_ego { self.ghost_place(ego) } else { None };
         let Some(link) = self.link.as_mut() else { return Ok(()) };
         let request = link.session.request();
+        for (lane, variable, value) in &orders {
+            request.set(id::LANE, *variable, lane, value);
+        }
         if sees_ego {
             if !self.ego_inside {
                 request.set(id::VEHICLE, var::ADD, EGO, &add_ego(ego.speed_m_s));
@@ -99,6 +105,46 @@ impl SumoTraffic {
         }
         (self.ego_inside, self.ghost) = (sees_ego, ghost.is_some());
         Ok(())
+    }
+
+    /// Lanes that close or open now, and limits that change: lane, variable, value.
+    fn orders(&mut self, ego: &EgoState, time_s: f64) -> Vec<(String, u8, Value)> {
+        let traffic = &self.config.traffic;
+        let schedule = &traffic.schedule;
+        let mut orders = Vec::new();
+        if schedule.is_empty() {
+            return orders;
+        }
+        if traffic.sees_ego {
+            let heading = self.road.at(ego.s_m, ego.d_m).heading_rad;
+            self.spans.update(ego, &self.geometry, &self.map, heading, 0.0);
+        }
+        if self.stage.update(schedule, time_s, &self.spans) {
+            for lane in &self.network.lanes {
+                let Some((from_m, to_m)) = lane.stretch_m(&self.road) else { continue };
+                let middle_m = 0.5 * (from_m + to_m);
+                let of_lane =
+                    |i: &&Incident| i.kind == IncidentKind::ClosedLane && lane.is_of(i.lane);
+                if !schedule.incidents.iter().any(|i| of_lane(&i)) {
+                    continue;
+                }
+                let is_closed = self.stage.closures(schedule).any(|(_, track, from_m, to_m)| {
+                    lane.is_of(track) && from_m < middle_m && middle_m < to_m
+                });
+                let closed_to = if is_closed { vec!["all".to_owned()] } else { Vec::new() };
+                orders.push((lane.id.clone(), var::DISALLOWED, Value::Texts(closed_to)));
+            }
+        }
+        let limit_m_s = schedule.limit_m_s(time_s).unwrap_or(f64::INFINITY);
+        if limit_m_s != self.limit_m_s {
+            self.limit_m_s = limit_m_s;
+            let limit_m_s = limit_m_s.min(traffic.max_speed_m_s);
+            for lane in &self.network.lanes {
+                let value = Value::Double(lane.speed_m_s.min(limit_m_s));
+                orders.push((lane.id.clone(), var::MAX_SPEED, value));
+            }
+        }
+        orders
     }
 
     /// Front bumper and heading of the ghost, if the ego reaches into a second lane.

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use sim::Scenario;
 use traffic_client::Mode;
+use traffic_client::native::TrafficConfig;
 use traffic_client::stats::{
     Moments, QUANTITIES, Quantity, Samples, kolmogorov_smirnov, kolmogorov_smirnov_by_chance,
     moments, wasserstein,
@@ -27,6 +28,9 @@ pub(super) struct Report {
     end_reason: End,
     /// Recordings that the drivers were calibrated to.
     calibrated_to: Vec<String>,
+    /// What came to the road and what it served, where an engine made it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    demand: Option<Demand>,
     simulated: Figures,
     /// All recordings together.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -44,6 +48,28 @@ pub(super) struct Report {
     /// The same for each recording.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     recordings: Vec<OneRecording>,
+}
+
+/// Demand and what became of it.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct Demand {
+    /// What the scenario asks for at the start of the road, vehicles per hour and lane.
+    asked_veh_h_lane: f64,
+    /// What its drivers carry in equilibrium, vehicles per hour and lane.
+    equilibrium_veh_h_lane: f64,
+    /// Vehicles that came to the road and those that wait before it at the end.
+    #[serde(flatten)]
+    arrivals: sim::Arrivals,
+}
+
+impl Demand {
+    pub(super) fn new(config: &TrafficConfig, arrivals: sim::Arrivals) -> Self {
+        Self {
+            asked_veh_h_lane: config.asked_veh_h_lane(),
+            equilibrium_veh_h_lane: config.capacity().flow_veh_h_lane,
+            arrivals,
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -254,6 +280,9 @@ impl Report {
             mode: driven.mode,
             end_reason: driven.end,
             calibrated_to: calibrated_to.iter().map(|p| p.display().to_string()).collect(),
+            demand: driven
+                .arrivals
+                .map(|arrivals| Demand::new(&scenario.traffic.demand(seed), arrivals)),
             simulated: figures(&driven.samples, driven.lanes_m),
             measured: there.then(|| figures(&measured.samples, measured.lanes_m)),
             comparisons: comparisons.collect(),

@@ -167,6 +167,8 @@ impl From<&Neighbour> for SceneVehicle {
                 VehicleClass::Car => 0,
                 VehicleClass::Van => 1,
                 VehicleClass::Truck => 2,
+                VehicleClass::Emergency => 3,
+                VehicleClass::Barrier => 4,
             },
             front_s_m: n.front_s_m,
             rear_s_m: n.rear_s_m,

@@ -102,7 +102,8 @@ pub(super) fn ego_markers(header: &Header, ego: &EgoState, scenery: &Scenery) ->
 pub(super) fn neighbour_marker(header: &Header, n: &Neighbour, road: &Road) -> Marker {
     let height_m = match n.class {
         VehicleClass::Car => 1.5,
-        VehicleClass::Van => 2.4,
+        VehicleClass::Van | VehicleClass::Emergency => 2.4,
+        VehicleClass::Barrier => 1.2,
         VehicleClass::Truck => TRUCK_HEIGHT_M,
     };
     let mid_s_m = 0.5 * (n.front_s_m + n.rear_s_m);
