@@ -155,6 +155,7 @@ impl World {
             on_traffic_failure,
             decider,
             speed_planner,
+            ..Overrides::default()
         };
         py.detach(|| {
             let scenario = changed(name, json, &changes)?;

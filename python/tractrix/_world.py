@@ -26,7 +26,8 @@ class World:
         scenario: Name of a built-in scenario (`tractrix.scenarios()`), a scenario file (`.toml`), or
             what `tractrix.scenario()` returned, changed.
         seed: Seed of everything that is drawn at random. Default: 1, or the manifest's.
-        road: Another road: `.xodr`, `.csv`, `builtin:highway`, `builtin:test-site`, `builtin:flat`.
+        road: Another road: `.xodr`, `.csv`, `builtin:highway`, `builtin:highway-sag`,
+            `builtin:test-site`, `builtin:flat`.
         truck: Another truck: a truck file or a built-in name.
         payload_kg: Another payload on the trailer, kg.
         traffic: The other vehicles: `native`, `sumo`, `replay:FILE` or `none`.

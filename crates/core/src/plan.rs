@@ -138,6 +138,10 @@ pub struct Plan {
     pub speed: Vec<SpeedPoint>,
     /// Identifier of the vehicle being followed.
     pub following: Option<u64>,
+    /// Traffic holds the truck up: car following asks for less than the reference, the speed plan is
+    /// made for staying behind a vehicle, a lane change slows into its gap, or the truck waits for
+    /// one at its lane's end.
+    pub held_up: bool,
     /// The guarded command.
     pub command: Command,
     /// What the guard changed, in order of detection.

@@ -1,4 +1,4 @@
-//! Built-in roads: a real hilly highway, a synthetic test site, a flat straight.
+//! Built-in roads: a real hilly highway, a real sag, a synthetic test site, a flat straight.
 
 use alloc::{vec, vec::Vec};
 
@@ -7,24 +7,36 @@ use tractrix_core::GRAVITY_M_S2;
 use crate::road::parallel_lanes;
 use crate::{Cubics, LaneEnd, LaneKind, LaneTrack, Line, Road, RoadObject};
 
-/// Grades of a hilly stretch of a real long-haul drive; origin and licence in the file's head.
-const HILLS: &str = include_str!("../data/longhaul_hills.csv");
+/// Grades of two stretches of real long-haul drives; origin and licence in the heads of the files.
+const HILLS: &str = include_str!("../data/highway_hills.csv");
+const SAG: &str = include_str!("../data/longhaul_hills.csv");
 
 const LANE_WIDTH_M: f64 = 3.75;
 const LENGTH_M: f64 = 15_000.0;
 
-/// 15 km of highway: real grades, curves down to R = 600 m, two to three lanes, an on-ramp at
-/// 3 km and an off-ramp at 11 km.
+/// 15 km of highway: real grades in waves of 1 to 3 km (-3.3 to +2.8 %, root mean square 1.5 %),
+/// curves down to R = 600 m, two to three lanes, an on-ramp at 3 km and an off-ramp at 11 km.
 ///
 /// The reference line is the right edge of the left through lane. Lanes: 0 right, 1 left, 2 a
 /// climbing stretch's third lane on the left, 3 the on-ramp, 4 the off-ramp.
 #[must_use]
 pub fn highway() -> Road {
+    highway_over("highway", HILLS)
+}
+
+/// The plan view and lanes of [`highway`] over a single real sag (-0.8 to +2.5 %): a road on which
+/// looking ahead saves next to nothing.
+#[must_use]
+pub fn highway_sag() -> Road {
+    highway_over("highway-sag", SAG)
+}
+
+fn highway_over(name: &str, grades_csv: &str) -> Road {
     let curves = plan_view(&HIGHWAY_CURVES);
     let line = Line::from_curvature(
         0.0,
         &curves,
-        Cubics::integral_of_linear(0.0, &hills()),
+        Cubics::integral_of_linear(0.0, &slopes(grades_csv)),
         bank(&curves),
     );
     let w = LANE_WIDTH_M;
@@ -67,7 +79,7 @@ pub fn highway() -> Road {
         ),
     ];
     let limits = vec![(0.0, 25.0), (9_000.0, 22.22), (10_000.0, 25.0)];
-    expect_valid(Road::new("highway", line, lanes, limits))
+    expect_valid(Road::new(name, line, lanes, limits))
 }
 
 /// 15 km with the statistics of the paper's site: grades to ±5 % with a standard deviation of
@@ -158,9 +170,9 @@ fn bank(curvature_1_m: &[(f64, f64)]) -> Cubics {
     Cubics::linear(&points)
 }
 
-/// (station m, slope) of the recorded hills.
-fn hills() -> Vec<(f64, f64)> {
-    HILLS
+/// (station m, slope) of recorded grades.
+fn slopes(grades_csv: &str) -> Vec<(f64, f64)> {
+    grades_csv
         .lines()
         .filter_map(|line| line.split_once(','))
         .filter_map(|(s, g)| Some((s.parse().ok()?, g.parse().ok()?)))
@@ -192,7 +204,29 @@ mod tests {
     }
 
     #[test]
-    fn the_highway_is_15_km_of_real_hills_with_curves_down_to_600_m() {
+    fn the_highway_rolls_in_waves_and_the_sag_is_one() {
+        // On one sag of 15 km nothing can be saved by looking ahead; the default road must have
+        // hills of the length that a truck's momentum carries.
+        let crests = |road: &Road| {
+            let slope = |i: u32| road.line().at(f64::from(i) * 50.0).slope;
+            (1..300).filter(|&i| slope(i - 1) > 0.0 && slope(i) <= 0.0).count()
+        };
+        let (hills, sag) = (highway(), highway_sag());
+        assert!(crests(&hills) >= 4, "{}", crests(&hills));
+        assert!(crests(&sag) <= 1, "{}", crests(&sag));
+        let slopes: Vec<f64> =
+            (0..=1_500).map(|i| hills.line().at(f64::from(i) * 10.0).slope).collect();
+        let rms = (slopes.iter().map(|g| g * g).sum::<f64>() / slopes.len() as f64).sqrt();
+        let steepest = slopes.iter().fold([0.0_f64; 2], |a, &g| [a[0].min(g), a[1].max(g)]);
+        assert!((rms - 0.015).abs() < 5e-4, "rms {rms}");
+        assert!((steepest[0] + 0.033).abs() < 5e-4 && (steepest[1] - 0.028).abs() < 5e-4);
+        let climbed = hills.at(15_000.0, 0.0).z_m - hills.at(0.0, 0.0).z_m;
+        assert!((climbed - 9.8).abs() < 0.1, "{climbed}");
+        assert_eq!(hills.lanes(), sag.lanes());
+    }
+
+    #[test]
+    fn the_highway_is_15_km_with_curves_down_to_600_m() {
         let road = highway();
         assert_eq!(road.length_m(), 15_000.0);
         let tightest = (0..15_000)

@@ -46,7 +46,8 @@ pub enum RoadError {
     },
     /// The name or extension is not known.
     #[error(
-        "{name}: a road is a .xodr or .csv file, builtin:highway, builtin:test-site or builtin:flat"
+        "{name}: a road is a .xodr or .csv file, builtin:highway, builtin:highway-sag, \
+         builtin:test-site or builtin:flat"
     )]
     UnknownRoad {
         /// What was asked for.

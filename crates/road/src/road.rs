@@ -303,19 +303,45 @@ impl Road {
     /// Reads a road by file or built-in name.
     ///
     /// # Errors
-    /// [`RoadError`] names the file, line and value.
+    /// [`RoadError`] names the file, line and value; a road with [`Road::findings`] that are
+    /// refused is an error too.
     #[cfg(feature = "std")]
     pub fn load(name: &str) -> Result<Self, RoadError> {
-        match name {
-            "builtin:highway" => Ok(crate::builtin::highway()),
-            "builtin:test-site" => Ok(crate::builtin::test_site()),
-            "builtin:flat" => Ok(crate::builtin::flat(15_000.0)),
+        let road = match name {
+            "builtin:highway" => crate::builtin::highway(),
+            "builtin:highway-sag" => crate::builtin::highway_sag(),
+            "builtin:test-site" => crate::builtin::test_site(),
+            "builtin:flat" => crate::builtin::flat(15_000.0),
             _ if has_extension(name, "xodr") => {
-                crate::opendrive::Network::load(name)?.longest_route()
+                crate::opendrive::Network::load(name)?.longest_route()?
             }
-            _ if has_extension(name, "csv") => crate::csv_profile::read(name),
-            _ => Err(RoadError::UnknownRoad { name: name.into() }),
+            _ if has_extension(name, "csv") => crate::csv_profile::read(name)?,
+            _ => return Err(RoadError::UnknownRoad { name: name.into() }),
+        };
+        match crate::findings::refusal(&road.findings()) {
+            Some(why) => Err(RoadError::Invalid { name: name.into(), why }),
+            None => Ok(road),
         }
+    }
+
+    /// Whether the surface is paved at (s, d): inside a lane of any kind, hard shoulders included.
+    /// Slits between lanes that are narrower than half a metre count as paved.
+    #[must_use]
+    pub fn is_paved(&self, s_m: f64, d_m: f64) -> bool {
+        const SLIT_M: f64 = 0.5;
+        let (mut left, mut right) = (f64::INFINITY, f64::INFINITY);
+        for lane in self.lanes_at(s_m).filter(|l| l.width_m(s_m) > 0.0) {
+            let (low, high) = (lane.right_edge_d_m(s_m), lane.left_edge_d_m(s_m));
+            if low <= d_m && d_m <= high {
+                return true;
+            }
+            if low > d_m {
+                left = left.min(low - d_m);
+            } else {
+                right = right.min(d_m - high);
+            }
+        }
+        left + right < SLIT_M
     }
 }
 

@@ -75,7 +75,7 @@ fn runs(at: &Path, payloads_kg: &[&str]) -> String {
     for payload in payloads_kg {
         let out = text(&at.join(format!("run_{payload}")));
         let options = ["--truck", "reference", "--payload-kg", payload, "--headless", "--out"];
-        let run = [&["run", "highway", "--duration", "300"], &options[..], &[&out]].concat();
+        let run = [&["run", "highway-sag", "--duration", "300"], &options[..], &[&out]].concat();
         assert!(support::server(&run).status.success());
     }
     text(at)

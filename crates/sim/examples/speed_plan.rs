@@ -1,18 +1,17 @@
 //! Cruise control and the receding-horizon speed planner in the full truck on the same road:
-//! fuel, trip time and brakes, what the plan of the whole trip promises, and the time of a tick.
+//! fuel, trip time and brakes against each other and against the ghost, what the plan of the whole
+//! trip promises, and the time of a tick.
 //!
-//! `cargo run --release -p sim --example speed_plan -- SCENARIO [KM] [--eco-roll] [--trace]`
+//! `cargo run --release -p sim --example speed_plan -- SCENARIO [KM] [--truck NAME] [--payload-kg KG]
+//! [--only-predictive] [--no-eco-roll] [--no-gears] [--trace] [--trace-cruise]`
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use planner::SpeedPlannerKind;
 use planner::pcc::model::profile_of;
-use planner::pcc::{SpeedBand, TripRequest, Tuning, plan_trip};
+use planner::pcc::{Leg, Price, SpeedBand, TripRequest, Tuning, plan_trip};
 use rustix::time::{ClockId, clock_gettime};
-use sim::{Scenario, Status, World};
+use sim::{GhostReport, Scenario, Status, World};
 use tractrix_core::{Tick, Vehicle};
-
-/// Marginal fuel of a joule at the wheels, g/J (0.0505 g/s per kW, 95 % driveline).
-const FUEL_G_J: f64 = 5.3e-5;
 
 /// What a run came to.
 #[derive(Default, Clone)]
@@ -27,6 +26,7 @@ struct Figures {
     shifts: usize,
     late_s: f64,
     price_g_s: f64,
+    ghost: Option<GhostReport>,
     tick_us: Vec<f64>,
     replan_us: Vec<f64>,
 }
@@ -39,6 +39,7 @@ fn cpu_us() -> f64 {
 
 fn drive(scenario: &Scenario, to_m: f64, trace: bool) -> Figures {
     let mut world = World::new(scenario, 1).unwrap();
+    world.attach_ghost().unwrap();
     let mut f = Figures { start_m: world.truck().state().s_m, ..Figures::default() };
     let (mut gear, mut plans) = (0, 0u64);
     let mut next_trace_m = 0.0;
@@ -97,6 +98,7 @@ fn drive(scenario: &Scenario, to_m: f64, trace: bool) -> Figures {
         f.price_g_s = plan.beta_g_s;
     }
     f.late_s = world.stack_mut().speed_plan_late_s();
+    f.ghost = world.ghost();
     f
 }
 
@@ -130,16 +132,36 @@ fn show(name: &str, f: &Figures) {
         "{name}: {:.1} g, {:.1} s, brakes {:.2} MJ, retarder {:.2} MJ, {} shifts, end {:.2} m/s, late {:.1} s, price {:.2} g/s",
         f.fuel_g, f.time_s, f.brake_mj, f.retarder_mj, f.shifts, f.end_m_s, f.late_s, f.price_g_s
     );
+    let Some(g) = f.ghost else { return };
+    let percent = |frac: Option<f64>| frac.map_or(f64::NAN, |f| 100.0 * f);
+    println!(
+        "  against the ghost ({:.1} g, {:.1} s, at {:.2} g/s): {:.2} % saved, {:.2} % where free, held up {:.0} s, {:.0} m",
+        g.fuel_g,
+        g.time_s,
+        g.price_of_time_g_s.unwrap_or(f64::NAN),
+        percent(g.saving_frac),
+        percent(g.free_saving_frac),
+        g.held_up_s,
+        g.held_up_m
+    );
 }
 
 fn main() {
     let mut args = std::env::args().skip(1);
     let name = args.next().unwrap_or_else(|| "test-site".into());
     let rest: Vec<String> = args.collect();
-    let km: f64 = rest.iter().find_map(|a| a.parse().ok()).unwrap_or(1e3);
+    let km: f64 = rest.first().and_then(|a| a.parse().ok()).unwrap_or(1e3);
     let flag = |f: &str| rest.iter().any(|a| a == f);
+    let after = |f: &str| rest.iter().skip_while(|a| *a != f).nth(1);
     let mut cruise = Scenario::builtin(&name).unwrap();
-    cruise.stack.speed_plan.eco_roll = flag("--eco-roll");
+    cruise.stack.speed_planner = SpeedPlannerKind::Cruise;
+    cruise.stack.speed_plan.eco_roll &= !flag("--no-eco-roll");
+    if let Some(truck) = after("--truck") {
+        cruise.truck.file.clone_from(truck);
+    }
+    if let Some(kg) = after("--payload-kg") {
+        cruise.truck.payload_kg = kg.parse().unwrap();
+    }
     cruise.stack.speed_plan.request_gears = !flag("--no-gears");
     let mut predictive = cruise.clone();
     predictive.stack.speed_planner = SpeedPlannerKind::Predictive;
@@ -176,12 +198,19 @@ fn main() {
         tuning: Tuning::default(),
     })
     .unwrap();
-    // Seconds at the price of the whole trip's plan, kinetic energy at the fuel that makes it.
     let mass_kg = world.truck().limits().road_load.mass_kg;
-    let energy_g = |v_m_s: f64| 0.5 * mass_kg * v_m_s * v_m_s * FUEL_G_J;
-    let late_g = trip.beta_g_s * (p.time_s - b.time_s);
-    let equal_g = p.fuel_g + late_g - energy_g(p.end_m_s) + energy_g(b.end_m_s);
-    println!("saved at equal trip time and end speed: {:.2} %", 100.0 * (1.0 - equal_g / b.fuel_g));
+    let leg = |f: &Figures| Leg {
+        fuel_g: f.fuel_g,
+        time_s: f.time_s,
+        kinetic_j: 0.5 * mass_kg * f.end_m_s * f.end_m_s,
+    };
+    let energy_g_j = p.ghost.and_then(|g| g.price_of_energy_g_j).unwrap();
+    let price = Price { time_g_s: trip.beta_g_s, energy_g_j };
+    let saved = price.saving_frac(&leg(&p), &leg(&b)).unwrap_or(f64::NAN);
+    println!(
+        "saved against this cruise control at equal trip time and end speed: {:.2} %",
+        100.0 * saved
+    );
     let promised = trip.plan;
     let base = trip.baseline_set_speed;
     println!(

@@ -9,8 +9,10 @@
 
 mod collision;
 mod error;
+mod ghost;
 mod memory;
 mod metrics;
+mod off_road;
 mod overrides;
 mod run_report;
 mod scenario;
@@ -22,8 +24,10 @@ mod world;
 
 pub use collision::{Footprint, footprints_overlap};
 pub use error::SimError;
+pub use ghost::{Ghost, GhostReport};
 pub use memory::{MemoryRecord, MemoryRecorder};
 pub use metrics::{Metrics, Summary};
+pub use off_road::OffRoad;
 pub use overrides::Overrides;
 pub use run_report::{EndReason, RunReport, WallClock};
 pub use scenario::{EgoStart, RunLimits, Scenario, TruckSection, Weather};

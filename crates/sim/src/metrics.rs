@@ -3,9 +3,11 @@
 use std::collections::{HashSet, VecDeque};
 
 use planner::safety::{RearResponse, RssConfig, SafeGap};
-use road::Road;
+use road::{LaneKind, Road};
 use serde::Serialize;
-use tractrix_core::{Geometry, Maneuver, Recorder, Tick, Time, VehicleClass, VehicleLimits};
+use tractrix_core::{
+    EgoState, Geometry, Maneuver, Recorder, Tick, Time, VehicleClass, VehicleLimits,
+};
 
 use crate::{Footprint, footprints_overlap};
 
@@ -24,6 +26,8 @@ pub struct Summary {
     pub brake_energy_j: f64,
     /// Lane changes begun.
     pub lane_changes: u32,
+    /// Share of the distance driven in the rightmost through lane.
+    pub keep_right_frac: f64,
     /// Collisions of the ego with other vehicles (each vehicle counts once per contact).
     pub collisions: u32,
     /// Smallest time to collision with the vehicle ahead in the ego's path, s; none if it never
@@ -42,6 +46,10 @@ pub struct Summary {
     pub vehicles_met: usize,
     /// Ticks in which the guard changed the command.
     pub guard_activations: u64,
+    /// Times that a wheel has left the paved lanes (shoulders are paved).
+    pub off_road_events: u32,
+    /// Time with a wheel beyond them, s.
+    pub off_road_time_s: f64,
     /// Hash over every bit of every ego state of the run (FNV-1a, 64 bit, hexadecimal).
     pub state_hash: String,
 }
@@ -63,6 +71,7 @@ pub struct Metrics {
     delta_sum: f64,
     ticks: u64,
     lane_changes: u32,
+    right_m: f64,
     last_maneuver: Maneuver,
     touching: Vec<u64>,
     met: HashSet<u64>,
@@ -96,6 +105,7 @@ impl Metrics {
             delta_sum: 0.0,
             ticks: 0,
             lane_changes: 0,
+            right_m: 0.0,
             last_maneuver: Maneuver::KeepLane,
             touching: Vec::new(),
             met: HashSet::new(),
@@ -123,6 +133,7 @@ impl Metrics {
             fuel_g: self.fuel_g - self.fuel_start_g,
             brake_energy_j: self.brake_energy_j,
             lane_changes: self.lane_changes,
+            keep_right_frac: self.right_m / (self.last_s_m - start_s).max(1e-9),
             collisions: self.collisions,
             min_time_to_collision_s: self.min_ttc_s.is_finite().then_some(self.min_ttc_s),
             rss_violations: self.rss_violations,
@@ -131,6 +142,8 @@ impl Metrics {
             max_trailer_lateral_error_m: self.max_trailer_lateral_error_m,
             vehicles_met: self.met.len(),
             guard_activations: self.guard_activations,
+            off_road_events: 0,
+            off_road_time_s: 0.0,
             state_hash: format!("{:016x}", self.hash),
         }
     }
@@ -153,6 +166,13 @@ impl Metrics {
             }
         }
         self.touching = touching;
+    }
+
+    /// Whether the truck is in the rightmost through lane.
+    fn is_right(&self, ego: &EgoState) -> bool {
+        let here = self.road.lane_at(ego.s_m, ego.d_m);
+        let through = |l: &&road::LaneTrack| l.kind == LaneKind::Driving;
+        here.is_some() && here == self.road.lanes_at(ego.s_m).find(through).map(|l| l.id)
     }
 
     /// Gap, time to collision and safe gap to the vehicle ahead in the ego's swept lane.
@@ -255,6 +275,9 @@ impl Recorder for Metrics {
         if self.start.is_none() {
             self.start = Some((tick.now, ego.s_m));
             self.fuel_start_g = ego.powertrain.fuel_used_g;
+        }
+        if self.last.is_some() && self.is_right(ego) {
+            self.right_m += ego.s_m - self.last_s_m;
         }
         self.last = Some(tick.now);
         self.last_s_m = ego.s_m;

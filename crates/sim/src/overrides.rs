@@ -29,6 +29,8 @@ pub struct Overrides<'a> {
     pub payload_kg: Option<f64>,
     /// Ends the run after this simulated time, s.
     pub duration_s: Option<f64>,
+    /// The run goes on when a wheel leaves the road.
+    pub allow_off_road: bool,
     /// The other vehicles.
     pub traffic: Option<&'a str>,
     /// How the traffic goes with the ego.
@@ -62,6 +64,7 @@ impl Overrides<'_> {
         if let Some(duration_s) = self.duration_s {
             scenario.run.duration_s = duration_s;
         }
+        scenario.run.allow_off_road |= self.allow_off_road;
         self.change_traffic(scenario)?;
         if let Some(planner) = self.speed_planner {
             let known = "cruise or predictive";

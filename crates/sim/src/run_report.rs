@@ -4,7 +4,7 @@ use serde::Serialize;
 use tractrix_core::Provenance;
 use traffic_client::Mode;
 
-use crate::{Arrivals, Status, Summary, TickTime, World};
+use crate::{Arrivals, GhostReport, Status, Summary, TickTime, World};
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -14,6 +14,8 @@ pub enum EndReason {
     RoadEnd,
     /// The scenario's duration is over.
     TimeOver,
+    /// A wheel has left the road.
+    OffRoad,
     /// The user stopped it.
     Interrupted,
     /// The world or the recording failed.
@@ -28,6 +30,7 @@ impl Status {
             Self::Running => None,
             Self::RoadEnd => Some(EndReason::RoadEnd),
             Self::TimeOver => Some(EndReason::TimeOver),
+            Self::OffRoad => Some(EndReason::OffRoad),
         }
     }
 }
@@ -57,6 +60,10 @@ pub struct RunReport {
     /// The figures.
     #[serde(flatten)]
     pub summary: Summary,
+    /// Fuel saved against the ghost at equal trip time ([`GhostReport::saving_frac`]).
+    saving_frac: Option<f64>,
+    /// The comparison with the ghost; none where none drove along.
+    pub ghost: Option<GhostReport>,
     missed_deadlines: u64,
     tick_time_us: TickTime,
     pace: String,
@@ -86,6 +93,7 @@ impl RunReport {
         wall: WallClock,
     ) -> Self {
         let summary = world.summary();
+        let ghost = world.ghost();
         let traffic = world.traffic();
         Self {
             provenance,
@@ -102,6 +110,8 @@ impl RunReport {
             pace: wall.pace,
             wall_time_s: wall.wall_time_s,
             realtime_factor: summary.duration_s / wall.wall_time_s.max(1e-9),
+            saving_frac: ghost.and_then(|ghost| ghost.saving_frac),
+            ghost,
             summary,
         }
     }

@@ -12,8 +12,9 @@ use crate::{SimError, TrafficSection};
 const RECORDED_LIMIT_M_S: f64 = 33.33;
 
 /// Built-in scenarios: name and text.
-const BUILTIN: [(&str, &str); 12] = [
+const BUILTIN: [(&str, &str); 13] = [
     ("highway", include_str!("../scenarios/highway.toml")),
+    ("highway-sag", include_str!("../scenarios/highway-sag.toml")),
     ("highway-empty", include_str!("../scenarios/highway-empty.toml")),
     ("test-site", include_str!("../scenarios/test-site.toml")),
     ("flat", include_str!("../scenarios/flat.toml")),
@@ -38,7 +39,8 @@ pub struct Scenario {
     /// One sentence on what it is for.
     #[serde(default)]
     pub description: String,
-    /// Road: `builtin:highway`, `builtin:test-site`, `builtin:flat`, or a path to `.xodr` or `.csv`.
+    /// Road: `builtin:highway`, `builtin:highway-sag`, `builtin:test-site`, `builtin:flat`,
+    /// or a path to `.xodr` or `.csv`.
     pub road: String,
     /// The truck.
     pub truck: TruckSection,
@@ -127,11 +129,16 @@ pub struct RunLimits {
     pub tick_s: f64,
     /// The run ends after this time, s, if the road has not ended before.
     pub duration_s: f64,
+    /// The run goes on when a wheel leaves the paved lanes; it is counted all the same.
+    pub allow_off_road: bool,
+    /// A ghost under ordinary cruise control drives along, where the shell shows one
+    /// ([`crate::World::attach_ghost`]).
+    pub ghost: bool,
 }
 
 impl Default for RunLimits {
     fn default() -> Self {
-        Self { tick_s: 0.01, duration_s: 3600.0 }
+        Self { tick_s: 0.01, duration_s: 3600.0, allow_off_road: false, ghost: true }
     }
 }
 

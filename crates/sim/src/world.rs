@@ -8,7 +8,7 @@ use planner::{RatesConfig, Stack, StackConfig};
 use road::Road;
 use tractrix_core::{Geometry, Recorder, Tick, Time, Vehicle};
 
-use crate::{Metrics, Scenario, SimError, SimTruck, Summary, Traffic};
+use crate::{Ghost, GhostReport, Metrics, OffRoad, Scenario, SimError, SimTruck, Summary, Traffic};
 
 /// Whether a run goes on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -20,6 +20,8 @@ pub enum Status {
     RoadEnd,
     /// The scenario's duration is over.
     TimeOver,
+    /// A wheel has left the road, and the scenario does not allow it.
+    OffRoad,
 }
 
 /// The closed loop. `Clone` is a snapshot: a clone continues bit for bit like its original. (Not in
@@ -34,9 +36,11 @@ pub struct World {
     traffic: Traffic,
     stack: Stack,
     metrics: Metrics,
+    wheels: OffRoad,
     now: Time,
     tick_ns: i64,
     status: Status,
+    ghost: Option<Box<Ghost>>,
     /// Sensors change what the stack sees of the traffic.
     sensors: bool,
 }
@@ -101,6 +105,7 @@ impl World {
         model: Arc<TruckModel>,
         folder: Option<&Path>,
     ) -> Result<Self, SimError> {
+        let wheels = OffRoad::new(&model);
         let truck = SimTruck::new(model, Arc::clone(&road), &scenario.ego, &scenario.weather)?;
         let geometry = truck.limits().geometry;
         let traffic = Traffic::new(scenario, seed, &road, geometry, folder)?;
@@ -118,6 +123,8 @@ impl World {
         };
         Ok(Self {
             metrics,
+            wheels,
+            ghost: None,
             sensors: scenario.traffic.perception.enabled,
             scenario: scenario.clone(),
             road,
@@ -160,14 +167,39 @@ impl World {
             let (ego, plan) = (&outcome.ego.value, self.stack.plan());
             self.metrics.record(&Tick { now: self.now, ego, scene, plan });
         }
+        if let Some(ghost) = &mut self.ghost {
+            ghost.follow(self.now, self.truck.state(), self.stack.plan().held_up);
+        }
+        let off = self.wheels.watch(self.truck.state(), &self.road, self.scenario.run.tick_s);
         self.now = self.now.plus_nanos(self.tick_ns);
         let front_m = self.truck.state().s_m + self.truck.limits().geometry.front_m;
-        if front_m + END_MARGIN_M >= self.road.length_m() {
+        if off && !self.scenario.run.allow_off_road {
+            self.status = Status::OffRoad;
+        } else if front_m + END_MARGIN_M >= self.road.length_m() {
             self.status = Status::RoadEnd;
         } else if self.now.seconds() >= self.scenario.run.duration_s {
             self.status = Status::TimeOver;
         }
         Ok(self.status)
+    }
+
+    /// Lets a ghost drive along from here on, before the first tick, unless the scenario wants none
+    /// (`run.ghost`). The run stays what it is, bit for bit.
+    ///
+    /// # Errors
+    /// As [`Ghost::new`].
+    pub fn attach_ghost(&mut self) -> Result<(), SimError> {
+        if self.scenario.run.ghost {
+            let ghost = Ghost::new(&self.scenario, self.truck.clone(), &self.road)?;
+            self.ghost = Some(Box::new(ghost));
+        }
+        Ok(())
+    }
+
+    /// The ghost and how the truck compares with it, if one drives along.
+    #[must_use]
+    pub fn ghost(&self) -> Option<GhostReport> {
+        self.ghost.as_ref().map(|ghost| ghost.report(self.now))
     }
 
     /// Runs to the end.
@@ -182,7 +214,11 @@ impl World {
     /// The figures so far.
     #[must_use]
     pub fn summary(&self) -> Summary {
-        self.metrics.summary()
+        Summary {
+            off_road_events: self.wheels.events(),
+            off_road_time_s: self.wheels.time_s(),
+            ..self.metrics.summary()
+        }
     }
 
     /// Time of the next tick.
@@ -235,6 +271,12 @@ impl World {
     /// The traffic, to reach SUMO's variables.
     pub const fn traffic_mut(&mut self) -> &mut Traffic {
         &mut self.traffic
+    }
+
+    /// Whether a wheel is beyond the paved lanes now.
+    #[must_use]
+    pub const fn is_off_road(&self) -> bool {
+        self.wheels.is_off_now()
     }
 
     /// The truck.

@@ -67,15 +67,18 @@ impl Driver {
         }
     }
 
+    /// Gap that IDM wants behind a vehicle, m.
+    fn wanted_gap_m(&self, v: f64, ahead_m_s: f64) -> f64 {
+        let closing = v * (v - ahead_m_s) / (2.0 * libm::sqrt(self.accel_m_s2 * self.decel_m_s2));
+        self.standstill_m + (v * self.headway_s + closing).max(0.0)
+    }
+
     /// IDM acceleration behind a vehicle at `gap_m` with speed `ahead_m_s`, or freely.
     fn accel(&self, v: f64, wanted_m_s: f64, ahead: Option<(f64, f64)>) -> f64 {
         let ratio = v / wanted_m_s.max(1.0);
         let free = 1.0 - ratio * ratio * ratio * ratio;
         let interaction = ahead.map_or(0.0, |(gap_m, ahead_m_s)| {
-            let closing =
-                v * (v - ahead_m_s) / (2.0 * libm::sqrt(self.accel_m_s2 * self.decel_m_s2));
-            let wanted_gap = self.standstill_m + (v * self.headway_s + closing).max(0.0);
-            let r = wanted_gap / gap_m.max(0.5);
+            let r = self.wanted_gap_m(v, ahead_m_s) / gap_m.max(0.5);
             r * r
         });
         self.accel_m_s2 * (free - interaction)
@@ -85,6 +88,16 @@ impl Driver {
 /// A vehicle's acceleration when it follows something at a gap; it wishes at least its own speed.
 fn follower(n: &Neighbour, ahead: Option<(f64, f64)>) -> f64 {
     Driver::of(n.class).accel(n.speed_m_s, n.speed_m_s.max(15.0) * 1.05, ahead)
+}
+
+/// Gap to a slower vehicle ahead at which the truck's own braking would be worth a change to a free
+/// left lane, m; others' accelerations left out.
+#[must_use]
+pub(crate) fn leaving_gap_m(view: &View<'_>, config: &MobilConfig, lead_m_s: f64) -> f64 {
+    let ego = Driver::of(VehicleClass::Truck);
+    let v = view.reference_speed_m_s.max(view.ego.speed_m_s);
+    let worth = (config.threshold_m_s2 + config.bias_right_m_s2).max(0.01);
+    ego.wanted_gap_m(v, lead_m_s) * libm::sqrt(ego.accel_m_s2 / worth)
 }
 
 /// The wish of MOBIL.

@@ -2,11 +2,13 @@
 //!
 //! | file | holds |
 //! |---|---|
+//! | `keep_right` | back to the right lane when it serves |
 //! | `rules` | the paper's rule with a distance |
 //! | `mobil` | MOBIL over the intelligent driver model |
 //! | `policy` | a learned policy's forward pass |
 //! | [`observation`] | what a learned policy sees |
 
+mod keep_right;
 mod mobil;
 pub mod observation;
 mod policy;
@@ -14,8 +16,9 @@ mod rules;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use keep_right::keep_right;
 pub use mobil::MobilConfig;
-pub(crate) use mobil::mobil;
+pub(crate) use mobil::{leaving_gap_m, mobil};
 pub use policy::Policy;
 pub(crate) use rules::rules;
 

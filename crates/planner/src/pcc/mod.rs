@@ -27,6 +27,6 @@ pub mod trip;
 pub use error::PccError;
 pub use model::{SpeedBand, Tuning, profile_of};
 pub use trip::{
-    Trip, TripPlan, TripRequest, TripResult, TripRow, TripStatus, TripTotals, plan_trip,
-    plan_trip_with,
+    Leg, Price, Trip, TripPlan, TripRequest, TripResult, TripRow, TripStatus, TripTotals,
+    plan_trip, plan_trip_with,
 };

@@ -93,6 +93,9 @@ pub(crate) struct SpeedTarget {
     pub traffic_accel_m_s2: f64,
     /// Grade at the truck, rad, mean over its length.
     pub grade_rad: f64,
+    /// Speed, m/s, and acceleration, m/s², from which on the truck brakes; up to there it rolls
+    /// where it is faster than the reference. None: it brakes for the reference.
+    pub brake_from: Option<(f64, f64)>,
     /// The reference is made for rolling on without fuel and brake.
     pub coast: bool,
 }
@@ -160,7 +163,14 @@ impl LongitudinalController {
         let signals = &ego.powertrain;
         let in_gear = InGear::new(&limits.powertrain, signals.gear, ego.speed_m_s);
         let error = target.speed_m_s - ego.speed_m_s;
-        let wanted = target.accel_m_s2 + c.gain_1_s * error + self.integral_m_s2;
+        let mass = effective_mass_kg(limits, &in_gear);
+        let resistance = resistance_n(&limits.road_load, ego.speed_m_s, target.grade_rad);
+        let coast = in_gear.coast_force_n();
+        let asked = target.accel_m_s2 + c.gain_1_s * error + self.integral_m_s2;
+        let wanted = target.brake_from.map_or(asked, |(speed_m_s, accel_m_s2)| {
+            let braked = accel_m_s2 + c.gain_1_s * (speed_m_s - ego.speed_m_s);
+            asked.max(braked.min((coast - resistance) / mass))
+        });
         let cruise = wanted.clamp(-c.decel_max_m_s2, c.accel_max_m_s2);
         let accel = cruise.min(target.traffic_accel_m_s2);
         let traffic_rules = accel < cruise;
@@ -169,9 +179,7 @@ impl LongitudinalController {
             return self.roll(dt_s, accel);
         }
 
-        let mass = effective_mass_kg(limits, &in_gear);
-        let force = mass * accel + resistance_n(&limits.road_load, ego.speed_m_s, target.grade_rad);
-        let coast = in_gear.coast_force_n();
+        let force = mass * accel + resistance;
         self.choose_actuator(dt_s, force - coast, mass, accel);
 
         let (pedal, retarder_frac, xbr) = match self.actuator {
@@ -189,6 +197,7 @@ impl LongitudinalController {
 
         let at_end = (force > in_gear.max_force_n() && error > 0.0)
             || (self.actuator == Actuator::Drive && force < coast && error < 0.0)
+            || wanted != asked
             || wanted != cruise
             || traffic_rules;
         if !at_end && !signals.shift_in_progress && signals.gear > 0 {

@@ -79,10 +79,16 @@ pub struct StackConfig {
     pub set_speed_m_s: f64,
     /// Who decides on lane changes.
     pub decider: DeciderKind,
+    /// The law asks to keep right: rules and MOBIL return to the right lane where it serves.
+    pub keep_right: bool,
     /// Who sets the reference speed.
     pub speed_planner: SpeedPlannerKind,
     /// Horizon of the predictive speed planner.
     pub speed_plan: HorizonConfig,
+    /// Cruise control lets the truck roll this much above the set speed on descents before it
+    /// brakes, m/s; speed limits and curves hold all the same. The predictive planner has its own
+    /// band.
+    pub overspeed_m_s: f64,
     /// Speed limits of the road count.
     pub obey_speed_limits: bool,
     /// Largest lateral acceleration in curves, m/s².
@@ -111,8 +117,10 @@ impl Default for StackConfig {
         Self {
             set_speed_m_s: 20.0,
             decider: DeciderKind::default(),
+            keep_right: true,
             speed_planner: SpeedPlannerKind::default(),
             speed_plan: HorizonConfig::default(),
+            overspeed_m_s: 0.0,
             obey_speed_limits: true,
             curve_accel_m_s2: 1.5,
             rates: RatesConfig::default(),
@@ -134,6 +142,7 @@ impl StackConfig {
     /// [`PlannerError::Config`] names the first offending key.
     pub fn check(&self) -> Result<(), PlannerError> {
         config_in("set_speed_m_s", self.set_speed_m_s, 0.0, 40.0)?;
+        config_in("overspeed_m_s", self.overspeed_m_s, 0.0, 10.0)?;
         config_in("curve_accel_m_s2", self.curve_accel_m_s2, 0.2, 4.0)?;
         let r = &self.rates;
         config_in("rates.tick_s", r.tick_s, 0.001, 0.1)?;

@@ -6,7 +6,8 @@ use super::speed::{Ahead, Doing};
 use super::{Stack, grade, wrapped};
 use crate::SpeedPlannerKind;
 use crate::decider::{
-    DeciderKind, LaneChoice, View, lane_ends, leave_ending_lane, mobil, observation, rules,
+    DeciderKind, LaneChoice, View, keep_right, lane_ends, leave_ending_lane, leaving_gap_m, mobil,
+    observation, rules,
 };
 use crate::pcc::horizon::LeadAhead;
 use crate::speed::{Following, LeadView, SpeedBounds, SpeedTarget, follow, leads, steady_gap_m};
@@ -14,7 +15,7 @@ use crate::steering::{
     LOWEST_SPEED_M_S, Lateral, LateralPath, ManeuverPlanner, PREVIEW_POINTS, PREVIEW_STEP_S,
     PathError, Situation,
 };
-use road::{LaneKind, Road};
+use road::{LaneEnd, LaneKind, Road};
 use tractrix_core::{
     Command, EgoState, GearRequest, Maneuver, PlanStatus, Scene, Time, VehicleLimits,
 };
@@ -22,6 +23,10 @@ use tractrix_core::{
 /// Spacing of the published path, s, and its number of points.
 const PATH_STEP_S: f64 = 0.2;
 const PATH_POINTS: usize = 26;
+/// A truck so near to its lane's end is slowed by it, m: it waits for a gap.
+const WAITS_WITHIN_M: f64 = 300.0;
+/// Headway that a return to the right lane leaves a follower under MOBIL, s.
+const REAR_HEADWAY_S: f64 = 2.0;
 /// Time for joining a lane's centre from beside it, s.
 const JOIN_S: f64 = 6.0;
 
@@ -85,6 +90,7 @@ impl Stack {
                 accel_m_s2,
                 traffic_accel_m_s2: following.map_or(f64::INFINITY, |(_, f)| f.accel_m_s2),
                 grade_rad,
+                brake_from: self.may_overspeed().then(|| self.ceiling.at(ego.s_m)).flatten(),
                 coast: self.plans_ahead() && self.speed.coasts(ego.s_m, &doing),
             };
             self.control(ego, maneuver.path(), &target, doing, road, limits)
@@ -98,6 +104,11 @@ impl Stack {
     /// Whether the speed is planned while driving.
     fn plans_ahead(&self) -> bool {
         self.config.speed_planner == SpeedPlannerKind::Predictive && self.profile.is_none()
+    }
+
+    /// Whether the truck may roll above the reference on descents.
+    fn may_overspeed(&self) -> bool {
+        self.config.speed_planner == SpeedPlannerKind::Cruise && self.config.overspeed_m_s > 0.0
     }
 
     /// Plans the speed of the next kilometres, if it is time to.
@@ -139,6 +150,13 @@ impl Stack {
             obey_speed_limits: self.config.obey_speed_limits,
             curve_accel_m_s2: self.config.curve_accel_m_s2,
         };
+        if self.may_overspeed() {
+            let over = SpeedBounds {
+                set_speed_m_s: bounds.set_speed_m_s + self.config.overspeed_m_s,
+                ..bounds
+            };
+            self.ceiling.update(road, lane, ego.s_m, &limits.geometry, &over, |_| None);
+        }
         let profile = match self.config.speed_planner {
             SpeedPlannerKind::Predictive => self.profile.as_ref(),
             SpeedPlannerKind::Cruise => None,
@@ -178,10 +196,20 @@ impl Stack {
                     maneuver.lane(),
                     at.reference_speed_m_s,
                 );
+                let law = self.config.keep_right;
                 match kind {
                     _ if lane_ends(&view) => leave_ending_lane(&view),
-                    DeciderKind::Rules { distance_m } => rules(&view, distance_m),
-                    DeciderKind::Mobil(config) => mobil(&view, &config),
+                    DeciderKind::Rules { distance_m } => match rules(&view, distance_m) {
+                        LaneChoice::Keep if law => keep_right(&view, |_| distance_m, distance_m),
+                        wish => wish,
+                    },
+                    DeciderKind::Mobil(config) => match mobil(&view, &config) {
+                        LaneChoice::Keep if law => {
+                            let leaving = |v: f64| leaving_gap_m(&view, &config, v);
+                            keep_right(&view, leaving, REAR_HEADWAY_S * at.ego.speed_m_s)
+                        }
+                        wish => wish,
+                    },
                     DeciderKind::Dqn => self.learned(&view),
                     DeciderKind::KeepLane | DeciderKind::External => LaneChoice::Keep,
                 }
@@ -215,6 +243,11 @@ impl Stack {
     ) -> Command {
         let dt_s = self.config.rates.control_s();
         let speed = self.longitudinal.step(dt_s, ego, target, limits);
+        let fenced = self.plans_ahead() && self.speed.last().is_some_and(|plan| plan.fenced);
+        let waits = road.lanes().get(usize::from(path.lane)).is_some_and(|lane| {
+            lane.end != LaneEnd::Continues && lane.s_end_m - ego.s_m < WAITS_WITHIN_M
+        });
+        self.plan.held_up = speed.traffic_rules || fenced || waits || !doing.free;
         let gear = if self.plans_ahead() {
             if speed.traffic_rules {
                 self.speed.held_up();

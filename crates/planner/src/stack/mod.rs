@@ -35,6 +35,8 @@ pub struct Stack {
     lateral: LateralController,
     longitudinal: LongitudinalController,
     reference: ReferenceSpeed,
+    /// Up to this speed cruise control rolls before it brakes.
+    ceiling: ReferenceSpeed,
     guard: GuardMemory,
     maneuver: Option<ManeuverPlanner>,
     ticks: u64,
@@ -89,6 +91,7 @@ impl Stack {
             lateral: LateralController::new(config.lateral, limits, rates.control_s())?,
             longitudinal: LongitudinalController::new(config.longitudinal),
             reference: ReferenceSpeed::default(),
+            ceiling: ReferenceSpeed::default(),
             guard: GuardMemory::default(),
             maneuver: None,
             ticks: 0,

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::graph::{Graph, Heading, Node};
 use super::model::{LaneSection, Link, Network, RoadRecord};
 use super::tracks::SHORTEST_SECTION_M;
-use crate::Placed;
+use crate::{Finding, Placed};
 
 /// Jumps above these are reported.
 const POSITION_M: f64 = 0.01;
@@ -80,6 +80,8 @@ pub struct MapReport {
     pub route_length_m: Option<f64>,
     /// Lane tracks of that route.
     pub route_lanes: Option<usize>,
+    /// What is odd about that route; a refused finding keeps it from being driven.
+    pub findings: Vec<Finding>,
     /// Smallest and largest grade along s, rise over run.
     pub grade_frac: [f64; 2],
     /// Smallest and largest height, m.
@@ -138,6 +140,7 @@ impl Network {
             drivable_lane_m,
             route_length_m: route.as_ref().map(crate::Road::length_m),
             route_lanes: route.as_ref().map(|r| r.lanes().len()),
+            findings: route.as_ref().map(crate::Road::findings).unwrap_or_default(),
             grade_frac: ranges.grade,
             elevation_m: ranges.elevation,
             bank_rad: ranges.bank,

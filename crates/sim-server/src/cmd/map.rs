@@ -5,8 +5,8 @@ mod carriageway;
 use std::collections::BTreeMap;
 
 use clap::{Parser, Subcommand};
-use road::Road;
 use road::opendrive::{MapReport, Network, RecordCount};
+use road::{Finding, Road, Severity};
 use serde::Serialize;
 
 use crate::failure::Failure;
@@ -42,17 +42,33 @@ struct MapJson {
 /// Runs the command.
 pub(crate) fn run(command: Command) -> Result<(), Failure> {
     let Command::Check(args) = command;
-    let (json, text) = if args.road.to_ascii_lowercase().ends_with(".xodr") {
+    let (json, text, refused) = if args.road.to_ascii_lowercase().ends_with(".xodr") {
         let report = Network::load(&args.road).map_err(Failure::input)?.check();
         let text = text(&report);
+        let refused = report.findings.iter().find(|f| f.severity == Severity::Refused).cloned();
         let json = MapJson { provenance: Provenance::of_seed(0), report };
-        (serde_json::to_string(&json), text)
+        (serde_json::to_string(&json), text, refused)
     } else {
         let road = Road::load(&args.road).map_err(Failure::input)?;
         let report = carriageway::inspect(&args.road, &road);
-        (serde_json::to_string(&report), carriageway::text(&report))
+        (serde_json::to_string(&report), carriageway::text(&report), None)
     };
-    output::result(if args.json { json.map_err(Failure::work)? } else { text }.as_str())
+    output::result(if args.json { json.map_err(Failure::work)? } else { text }.as_str())?;
+    match refused {
+        Some(finding) => Err(Failure::Input(format!("{}: {finding}", args.road))),
+        None => Ok(()),
+    }
+}
+
+/// Findings as lines: `warned: width_m = ...`.
+fn finding_lines(findings: &[Finding]) -> impl Iterator<Item = String> {
+    findings.iter().map(|f| {
+        let word = match f.severity {
+            Severity::Warned => "warned",
+            Severity::Refused => "refused",
+        };
+        format!("{word}: {f}")
+    })
 }
 
 fn text(r: &MapReport) -> String {
@@ -84,6 +100,7 @@ fn text(r: &MapReport) -> String {
         format!("unsupported: {}", records(&r.unsupported)),
         format!("ignored: {}", records(&r.ignored)),
     ];
+    lines.extend(finding_lines(&r.findings));
     lines.extend(r.broken_links.iter().map(|link| format!("broken link: {link}")));
     let jumps: usize = r.jump_counts.values().sum();
     lines.push(format!("{jumps} jumps"));

@@ -18,7 +18,7 @@ pub(crate) struct Args {
     /// A scenario file, or the name of a built-in one (`scenario list`).
     #[arg(default_value = "highway")]
     scenario: String,
-    /// Another road: .xodr, .csv, builtin:highway, builtin:test-site or builtin:flat.
+    /// Another road: .xodr, .csv, builtin:highway, builtin:highway-sag, builtin:test-site or builtin:flat.
     #[arg(long)]
     road: Option<String>,
     /// Another truck: a truck file or a built-in name.
@@ -53,6 +53,9 @@ pub(crate) struct Args {
     /// Ends the run after this simulated time.
     #[arg(long, value_name = "S", value_parser = positive)]
     duration: Option<f64>,
+    /// Goes on when a wheel leaves the road; it is counted all the same.
+    #[arg(long)]
+    allow_off_road: bool,
     /// realtime, max, or simulated seconds per second [default: realtime, max with --headless].
     #[arg(long)]
     pace: Option<Pace>,

@@ -2,6 +2,7 @@
 
 use road::Road;
 use serde::Serialize;
+use sim::GhostReport;
 use tractrix_core::{
     EgoState, GuardReason, LaneChangeRefusal, Maneuver, Neighbour, Plan, PlanStatus, RPM_PER_RAD_S,
     Scene, Time, VehicleClass,
@@ -29,6 +30,8 @@ pub(super) struct Frame<'a> {
     /// The vehicle ahead.
     pub(super) lead: Option<Lead>,
     pub(super) speed_ahead: SpeedAhead,
+    /// None where no ghost drives along.
+    pub(super) ghost: Option<GhostHere>,
     pub(super) neighbours: Vec<Other>,
 }
 
@@ -47,6 +50,10 @@ pub(super) struct Run<'a> {
     pub(super) lane_changes: u32,
     pub(super) collisions: u32,
     pub(super) guard_activations: u64,
+    /// A wheel is beyond the paved lanes.
+    pub(super) off_road: bool,
+    pub(super) off_road_events: u32,
+    pub(super) off_road_time_s: f64,
     pub(super) max_lateral_error_m: f64,
     pub(super) min_time_to_collision_s: Option<f64>,
     pub(super) set_speed_m_s: f64,
@@ -114,6 +121,28 @@ impl From<&EgoState> for Ego {
             retarder_force_n: round(p.retarder_force_n, 0.1),
             fuel_rate_g_s: round(p.fuel_rate_g_s, 1e2),
             fuel_used_g: round(p.fuel_used_g, 10.0),
+        }
+    }
+}
+
+/// The ghost: where it is on the map, and the comparison with it.
+#[derive(Debug, Serialize)]
+pub(super) struct GhostHere {
+    x_m: f64,
+    y_m: f64,
+    yaw_rad: f64,
+    #[serde(flatten)]
+    report: GhostReport,
+}
+
+impl GhostHere {
+    pub(super) fn new(road: &Road, report: GhostReport) -> Self {
+        let at = road.at(report.s_m, report.d_m);
+        Self {
+            x_m: round(at.x_m, 1e3),
+            y_m: round(at.y_m, 1e3),
+            yaw_rad: round(at.heading_rad, 1e5),
+            report,
         }
     }
 }

@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use road::Road;
 use serde::Serialize;
-use sim::{Scenario, Summary, World};
+use sim::{GhostReport, Scenario, Summary, World};
 use tractrix_core::{Recorder, Tick};
 
 use super::Shared;
 use super::ahead::{Lead, SpeedAhead};
-use super::frame::{Ego, Frame, Here, Other, Planned, Refused, Run, Snapshot};
+use super::frame::{Ego, Frame, GhostHere, Here, Other, Planned, Refused, Run, Snapshot};
 use super::strip::round;
 use crate::driver::{Pace, RunState};
 use crate::provenance::Provenance;
@@ -38,6 +38,8 @@ struct SummarySoFar<'a> {
     provenance: Provenance,
     #[serde(flatten)]
     summary: &'a Summary,
+    saving_frac: Option<f64>,
+    ghost: Option<GhostReport>,
 }
 
 impl Publisher {
@@ -69,7 +71,7 @@ impl Publisher {
             self.realtime_factor = (time_s - self.mark.1) / (wall_s - self.mark.0);
             self.mark = (wall_s, time_s);
         }
-        let summary = world.summary();
+        let (summary, ghost) = (world.summary(), world.ghost());
         let frame = Frame {
             provenance: self.provenance,
             kind: "frame",
@@ -86,6 +88,9 @@ impl Publisher {
                 lane_changes: summary.lane_changes,
                 collisions: summary.collisions,
                 guard_activations: summary.guard_activations,
+                off_road: world.is_off_road(),
+                off_road_events: summary.off_road_events,
+                off_road_time_s: round(summary.off_road_time_s, 100.0),
                 max_lateral_error_m: round(summary.max_lateral_error_m, 1e4),
                 min_time_to_collision_s: summary.min_time_to_collision_s.map(|t| round(t, 100.0)),
                 set_speed_m_s: round(world.stack().config().set_speed_m_s, 1e2),
@@ -96,9 +101,15 @@ impl Publisher {
             plan: Planned::from(&tick.plan),
             lead: Lead::of(&tick.plan, &tick.ego, &tick.scene, world.geometry().front_m),
             speed_ahead: SpeedAhead::of(&tick.plan, world.stack().speed_plan(), tick.ego.s_m),
+            ghost: ghost.map(|report| GhostHere::new(&self.road, report)),
             neighbours: tick.scene.neighbours.iter().map(Other::from).collect(),
         };
-        let so_far = SummarySoFar { provenance: self.provenance, summary: &summary };
+        let so_far = SummarySoFar {
+            provenance: self.provenance,
+            summary: &summary,
+            saving_frac: ghost.and_then(|ghost| ghost.saving_frac),
+            ghost,
+        };
         if let (Ok(frame), Ok(so_far)) =
             (serde_json::to_string(&frame), serde_json::to_string(&so_far))
         {

@@ -73,8 +73,9 @@ impl Recorder for Sinks<'_> {
 }
 
 /// Drives a world to its end, until `stop`, or until the world or the recording fails.
-pub(crate) fn drive(job: Job) -> Ended {
-    Drive::new(job).run()
+pub(crate) fn drive(mut job: Job) -> Ended {
+    let attached = job.world.attach_ghost().map_err(Failure::work);
+    Drive::new(job).run(attached.err())
 }
 
 struct Drive {
@@ -102,9 +103,11 @@ impl Drive {
         }
     }
 
-    fn run(mut self) -> Ended {
-        let mut failure = None;
+    fn run(mut self, mut failure: Option<Failure>) -> Ended {
         let reason = loop {
+            if failure.is_some() {
+                break EndReason::Failed;
+            }
             while let Ok(control) = self.job.controls.try_recv() {
                 self.apply(control);
             }

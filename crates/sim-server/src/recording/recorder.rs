@@ -159,6 +159,7 @@ impl Recorder for Recording {
                 lateral_error_m: p.lateral_error_m,
                 lane: p.lane,
                 following: p.following,
+                held_up: p.held_up,
                 command: p.command,
             },
             scene: scene_due.then(|| tick.scene.clone()),

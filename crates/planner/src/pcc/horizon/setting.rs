@@ -52,18 +52,9 @@ impl Known {
         Ok(Self { limits: request.limits.clone(), top_e, truck, tables })
     }
 
-    /// Fuel of a joule per kilogram at the set speed, g per J/kg.
-    fn marginal_g_j_kg(&self, set_m_s: f64) -> f64 {
-        let g = self.truck.strongest_gear(set_m_s);
-        let phi = self.truck.traction_m_s2(g, set_m_s);
-        let drive = Drive::Gear(g as u8);
-        let fuel = |p: f64| self.truck.fuel_g_s(drive, set_m_s, p);
-        (fuel(phi) - fuel(0.5 * phi)) / (0.5 * phi * set_m_s)
-    }
-
     /// Price of time at the set speed on the flat, g/s: marginal fuel × drag slope × v³.
     pub(super) fn beta_guess(&self, set_m_s: f64) -> f64 {
-        self.marginal_g_j_kg(set_m_s) * self.truck.drag_1_m * set_m_s * set_m_s * set_m_s
+        self.truck.marginal_fuel_g_j_kg(set_m_s) * self.truck.drag_1_m * set_m_s * set_m_s * set_m_s
     }
 }
 
@@ -137,7 +128,7 @@ impl Setting {
                 (0.5 * low * low).min(0.5 * v * v)
             })
             .collect();
-        let worth = known.marginal_g_j_kg(set);
+        let worth = known.truck.marginal_fuel_g_j_kg(set);
         let terminal = Terminal::Soft {
             reference: cruise[course.n()].min(hold[course.n()]),
             pay: END_WORTH.0 * worth,

@@ -188,6 +188,17 @@ impl Truck {
         }
     }
 
+    /// Fuel of a joule per kilogram made at a speed, g per J/kg: the slope of the fuel between half
+    /// and full load in the strongest gear.
+    #[must_use]
+    pub fn marginal_fuel_g_j_kg(&self, v_m_s: f64) -> f64 {
+        let g = self.strongest_gear(v_m_s);
+        let phi = self.traction_m_s2(g, v_m_s);
+        let drive = Drive::Gear(g as u8);
+        let fuel = |p: f64| self.fuel_g_s(drive, v_m_s, p);
+        (fuel(phi) - fuel(0.5 * phi)) / (0.5 * phi * v_m_s)
+    }
+
     /// Fuel flow with the driveline open, g/s.
     #[must_use]
     pub fn idle_fuel_g_s(&self) -> f64 {

@@ -154,12 +154,7 @@ impl Trip {
     #[must_use]
     pub fn beta_guess(&self) -> f64 {
         let v = self.set_m_s;
-        let g = self.truck.strongest_gear(v);
-        let phi = self.truck.traction_m_s2(g, v);
-        let drive = Drive::Gear(g as u8);
-        let q = (self.truck.fuel_g_s(drive, v, phi) - self.truck.fuel_g_s(drive, v, 0.5 * phi))
-            / (0.5 * phi * v);
-        q * self.truck.drag_1_m * v * v * v
+        self.truck.marginal_fuel_g_j_kg(v) * self.truck.drag_1_m * v * v * v
     }
 
     /// Solves for one trip time. The plan returned is driven, not promised: energies that the truth

@@ -117,6 +117,14 @@ pub struct TripPlan {
     goal_s: f64,
 }
 
+impl TripPlan {
+    /// Price of time, g/s: the multiplier of the trip time.
+    #[must_use]
+    pub fn price_of_time_g_s(&self) -> f64 {
+        self.profile.beta_g_s
+    }
+}
+
 impl Trip {
     /// Solves for the requested trip time, or for that of the set-speed cruise control.
     pub fn plan(&self, trip_time_s: Option<f64>, solver: &mut Solver<'_>) -> TripPlan {

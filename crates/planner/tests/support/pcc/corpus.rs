@@ -88,7 +88,7 @@ pub(crate) fn roads() -> Vec<(&'static str, Vec<ProfilePoint>)> {
         ("hilly5", hills(|i| [0.03, 0.05, 0.04, 0.035, 0.045][i % 5], 1875.0)),
         ("mountain", hills(|i| [0.03, 0.04][i % 2], 5000.0)),
         ("test_site", profile_of(&road::builtin::test_site(), 12.5)),
-        ("highway", profile_of(&road::builtin::highway(), 12.5)),
+        ("highway_sag", profile_of(&road::builtin::highway_sag(), 12.5)),
     ]
 }
 

@@ -69,7 +69,7 @@ pub(super) fn measure(out: &OutFolder, seed: u64, threads: &Threads) -> Result<H
     let drives_at = out.begin("drives")?;
     let truck = TruckParameters::load(TRUCK).map_err(Failure::work)?;
     let hidden = hide(&truck, seed)?;
-    let scenario = Scenario::builtin("highway").map_err(Failure::work)?;
+    let scenario = Scenario::builtin("highway-sag").map_err(Failure::work)?;
     let road = Arc::new(Road::load(&scenario.road).map_err(Failure::work)?);
     let tables = collect(threads, DRIVES + CLEAN_DRIVES, |i| {
         let clean = i >= DRIVES;
@@ -187,7 +187,7 @@ pub(super) fn close_the_loop(
 ) -> Result<ClosedLoop, Failure> {
     let truck = TruckParameters::load(TRUCK).map_err(Failure::work)?;
     let extended = overlay.map_or_else(|| Ok(truck.clone()), |o| truck.with_overlay(o));
-    let mut scenario = Scenario::builtin("highway").map_err(Failure::work)?;
+    let mut scenario = Scenario::builtin("highway-sag").map_err(Failure::work)?;
     scenario.traffic.source = TrafficKind::None;
     scenario.truck.payload_kg = TRIP_PAYLOAD_KG;
     let road = Arc::new(Road::load(&scenario.road).map_err(Failure::work)?);

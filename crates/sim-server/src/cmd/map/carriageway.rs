@@ -1,6 +1,6 @@
 //! The report of a road that is one carriageway: a CSV profile or a built-in road.
 
-use road::{LaneKind, Road};
+use road::{Finding, LaneKind, Road};
 use serde::Serialize;
 
 use crate::provenance::Provenance;
@@ -21,6 +21,8 @@ pub(super) struct Report {
     climb_m: f64,
     speed_limit_m_s: Range,
     objects: usize,
+    /// Values that no highway has.
+    findings: Vec<Finding>,
     jumps: Vec<Jump>,
 }
 
@@ -96,6 +98,7 @@ pub(super) fn inspect(name: &str, road: &Road) -> Report {
         climb_m: (1..points.len()).map(|i| (height(i) - height(i - 1)).max(0.0)).sum(),
         speed_limit_m_s: Range::of(road.speed_limits().iter().map(|l| l.1)),
         objects: road.objects().len(),
+        findings: road.findings(),
         jumps: jumps(road),
     }
 }
@@ -153,6 +156,7 @@ pub(super) fn text(r: &Report) -> String {
             l.id, l.kind, l.s_start_m, l.s_end_m, l.width_m.min, l.width_m.max
         )
     }));
+    lines.extend(super::finding_lines(&r.findings));
     lines.push(format!("{} jumps", r.jumps.len()));
     lines.extend(r.jumps.iter().map(|j| {
         format!(

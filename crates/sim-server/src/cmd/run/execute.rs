@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use planner::decider::DeciderKind;
-use sim::{EndReason, RunReport, Scenario, TrafficKind, WallClock, World};
+use road::Road;
+use sim::{EndReason, GhostReport, RunReport, Scenario, TrafficKind, WallClock, World};
 use tokio::sync::Notify;
 use tractrix_core::Vehicle;
 
@@ -38,6 +39,7 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
         _ => out.path().join("sumo"),
     };
     let world = World::in_folder(scenario, seed, &sumo).map_err(Failure::input)?;
+    warn_of_road(world.road());
     let (provenance, started) = (Provenance::of_seed(seed), unix_time());
     let combination = Combination::new(world.truck().limits());
     let (controls, received) = driver::channel();
@@ -91,6 +93,18 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     runtime.shutdown_background();
     let (summary, json) = result?;
     report(args.json, &summary, &json, &out.path())
+}
+
+/// What is odd about the road, on stderr: the first few, all are in `map check`.
+fn warn_of_road(road: &Road) {
+    const SHOWN: usize = 5;
+    let findings = road.findings();
+    for finding in findings.iter().take(SHOWN) {
+        output::note(&format!("warning: road {}: {finding}", road.name()));
+    }
+    if let more @ 1.. = findings.len().saturating_sub(SHOWN) {
+        output::note(&format!("warning: {more} more of them; see map check"));
+    }
 }
 
 /// The report of the diagnosis that wrote a truck file: it lies beside it.
@@ -216,7 +230,7 @@ fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) -> Result<(
     let litres_per_100_km = s.fuel_g / DIESEL_G_PER_L / (s.distance_m * 1e-5).max(1e-9);
     output::result(&format!(
         "{:.2} km in {:.1} s, {:.1} km/h, {:.2} kg fuel ({litres_per_100_km:.1} l/100 km), \
-         {} collisions, {} lane changes, lateral error at most {:.3} m, guard {} ticks\n{}",
+         {} collisions, {} lane changes, lateral error at most {:.3} m, guard {} ticks{}\n{}",
         s.distance_m * 1e-3,
         s.duration_s,
         s.mean_speed_m_s * 3.6,
@@ -225,8 +239,29 @@ fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) -> Result<(
         s.lane_changes,
         s.max_lateral_error_m,
         s.guard_activations,
+        run.ghost.as_ref().map_or_else(String::new, against_ghost),
         folder.display(),
     ))
+}
+
+/// What was saved against the ghost, and what traffic cost.
+fn against_ghost(ghost: &GhostReport) -> String {
+    let percent = |frac: Option<f64>| {
+        frac.map_or("not known".to_owned(), |frac| format!("{:.1} %", 100.0 * frac))
+    };
+    let mut text = format!(
+        "\nsaved against cruise control on an empty road, at equal time: {}",
+        percent(ghost.saving_frac)
+    );
+    if ghost.held_up_s > 0.0 {
+        text.push_str(&format!(
+            " ({} where traffic did not hold the truck up; it did for {:.0} s, {:.2} km)",
+            percent(ghost.free_saving_frac),
+            ghost.held_up_s,
+            ghost.held_up_m * 1e-3
+        ));
+    }
+    text
 }
 
 /// Density of diesel fuel, g/l (EN 590, middle of 820 to 845).

@@ -17,6 +17,7 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
         truck: args.truck.as_deref(),
         payload_kg: args.payload_kg,
         duration_s: args.duration,
+        allow_off_road: args.allow_off_road,
         traffic: args.traffic.as_deref(),
         mode: args.mode.as_deref(),
         manifest: args.manifest.as_deref(),
