@@ -326,7 +326,9 @@ def test_a_refused_lane_change_says_why(
         assert page.is_hidden("#refusal")
         page.click("#right")
         page.wait_for_selector("#refusal", state="visible")
-        assert "there is no lane on that side" in page.inner_text("#refusal")
+        said = page.inner_text("#refusal")
+        assert "asked for from outside" in said
+        assert "there is no lane on that side" in said
 
 
 def test_the_speed_planned_ahead_is_drawn_and_kept_to(

@@ -32,7 +32,10 @@ pub use ego::{EgoState, PowertrainSignals, TrailerState};
 pub use error::CoreError;
 pub use fuel::{FuelModel, LowLoadFuel, RPM_PER_RAD_S};
 pub use limits::{BrakeLimits, Geometry, LateralLimits, PowertrainLimits, RoadLoad, VehicleLimits};
-pub use plan::{GuardReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus, SpeedPoint};
+pub use plan::{
+    GuardReason, LaneChangeReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus,
+    SpeedPoint,
+};
 pub use provenance::Provenance;
 pub use scene::{Neighbour, Scene, VehicleClass};
 pub use seams::{Recorder, Stamped, Tick, TrafficSource, Vehicle};

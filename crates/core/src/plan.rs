@@ -22,6 +22,22 @@ pub enum Maneuver {
     MinimalRisk,
 }
 
+/// Why a lane change is wished.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LaneChangeReason {
+    /// The own lane ends.
+    LaneEnds,
+    /// A vehicle ahead in the own lane is slower than the truck would drive.
+    SlowerAhead,
+    /// The right lane serves as well.
+    KeepRight,
+    /// The learned policy chose it.
+    Policy,
+    /// It was asked for from outside.
+    Requested,
+}
+
 /// Why a requested lane change is not driven (the paper's Fig. 14 and the rules around it).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -116,6 +132,8 @@ pub struct SpeedPoint {
 pub struct Plan {
     /// The manoeuvre.
     pub maneuver: Maneuver,
+    /// Why the lane change is wished that is driven, or that was refused in this tick.
+    pub reason: Option<LaneChangeReason>,
     /// Why a requested lane change was refused in this tick.
     pub refusal: Option<LaneChangeRefusal>,
     /// Outcome of the speed planner.

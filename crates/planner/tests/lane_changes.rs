@@ -7,7 +7,9 @@ use planner::{DeciderKind, LaneChoice, Stack, StackConfig, drive_tick};
 use road::{Road, builtin};
 use support::data_sheet::reference_limits;
 use support::{Misfit, Plant, no_traffic};
-use tractrix_core::{Maneuver, Time};
+use tractrix_core::{
+    LaneChangeReason, LaneChangeRefusal, Maneuver, Neighbour, Scene, Time, Vehicle,
+};
 
 fn tick(i: i64) -> Time {
     Time(i * 10_000_000)
@@ -107,4 +109,48 @@ fn it_still_does_when_stiffness_and_mass_are_wrong_by_a_fifth() {
             e.trailer_m
         );
     }
+}
+
+/// The first plan that has a reason for a lane change, behind a slow truck or on an empty road.
+fn first_reasoned(decider: DeciderKind, wish: LaneChoice, slow: bool) -> tractrix_core::Plan {
+    let road = builtin::flat(3000.0);
+    let d = road.lanes()[0].center_d_m(0.0);
+    let mut plant = Plant::new(&road, reference_limits(), 200.0, d, 20.0);
+    let config = StackConfig { decider, ..StackConfig::default() };
+    let mut stack = Stack::new(config, &reference_limits()).unwrap();
+    stack.request_lane_change(wish);
+    let truck = Neighbour {
+        id: 7,
+        front_s_m: 266.0,
+        rear_s_m: 250.0,
+        d_m: d,
+        width_m: 2.5,
+        speed_m_s: 15.0,
+        ..Neighbour::default()
+    };
+    for i in 0..300 {
+        let ego = plant.ego(tick(i)).unwrap();
+        let neighbours = if slow { vec![truck] } else { Vec::new() };
+        let scene = Scene { time: tick(i), neighbours };
+        let plan = stack.tick(tick(i), &ego, &scene, &road, &reference_limits());
+        if plan.reason.is_some() {
+            return plan.clone();
+        }
+        let command = plan.command;
+        plant.command(tick(i), &command).unwrap();
+    }
+    panic!("no change was wished");
+}
+
+#[test]
+fn a_change_says_why_it_is_wished_and_a_refused_one_too() {
+    let rules = DeciderKind::Rules { distance_m: 100.0 };
+    let overtakes = first_reasoned(rules, LaneChoice::Keep, true);
+    assert_eq!(overtakes.reason, Some(LaneChangeReason::SlowerAhead));
+    let asked = first_reasoned(DeciderKind::External, LaneChoice::Left, false);
+    assert_eq!(asked.reason, Some(LaneChangeReason::Requested));
+    assert_eq!((asked.maneuver, asked.refusal), (Maneuver::ChangeLeft, None));
+    let refused = first_reasoned(DeciderKind::External, LaneChoice::Right, false);
+    assert_eq!(refused.reason, Some(LaneChangeReason::Requested));
+    assert_eq!(refused.refusal, Some(LaneChangeRefusal::NoTargetLane));
 }

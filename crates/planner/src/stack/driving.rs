@@ -17,7 +17,8 @@ use crate::steering::{
 };
 use road::{LaneEnd, LaneKind, Road};
 use tractrix_core::{
-    Command, EgoState, GearRequest, Maneuver, PlanStatus, Scene, Time, VehicleLimits,
+    Command, EgoState, GearRequest, LaneChangeReason, Maneuver, PlanStatus, Scene, Time,
+    VehicleLimits,
 };
 
 /// Spacing of the published path, s, and its number of points.
@@ -215,8 +216,32 @@ impl Stack {
                 }
             }
         };
+        if wish != LaneChoice::Keep {
+            self.plan.reason = Some(self.reason(wish, maneuver.lane(), at));
+        } else if maneuver.maneuver() == Maneuver::KeepLane {
+            self.plan.reason = None;
+        }
         if let Err(refusal) = maneuver.request(wish, at) {
             self.plan.refusal = Some(refusal);
+        }
+    }
+
+    /// Why the decider wishes a change.
+    fn reason(&self, wish: LaneChoice, lane: u16, at: &Situation<'_>) -> LaneChangeReason {
+        let reference_m_s = at.reference_speed_m_s;
+        let view = View::new(at.ego, &at.limits.geometry, at.scene, at.road, lane, reference_m_s);
+        let slower_within = |distance_m: f64| {
+            view.ahead(lane).is_some_and(|(n, gap)| gap < distance_m && n.speed_m_s < reference_m_s)
+        };
+        match self.config.decider {
+            DeciderKind::External => LaneChangeReason::Requested,
+            _ if lane_ends(&view) => LaneChangeReason::LaneEnds,
+            DeciderKind::Dqn => LaneChangeReason::Policy,
+            DeciderKind::Rules { distance_m } if slower_within(distance_m) => {
+                LaneChangeReason::SlowerAhead
+            }
+            _ if wish == LaneChoice::Right => LaneChangeReason::KeepRight,
+            _ => LaneChangeReason::SlowerAhead,
         }
     }
 

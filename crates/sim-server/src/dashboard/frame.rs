@@ -4,8 +4,8 @@ use road::Road;
 use serde::Serialize;
 use sim::GhostReport;
 use tractrix_core::{
-    EgoState, GuardReason, LaneChangeRefusal, Maneuver, Neighbour, Plan, PlanStatus, RPM_PER_RAD_S,
-    Scene, Time, VehicleClass,
+    EgoState, GuardReason, LaneChangeReason, LaneChangeRefusal, Maneuver, Neighbour, Plan,
+    PlanStatus, RPM_PER_RAD_S, Scene, Time, VehicleClass,
 };
 
 use super::ahead::{Lead, SpeedAhead};
@@ -64,7 +64,9 @@ pub(super) struct Run<'a> {
 /// A lane change that was wished and not driven.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub(super) struct Refused {
-    pub(super) reason: LaneChangeRefusal,
+    pub(super) refusal: LaneChangeRefusal,
+    /// Why it was wished.
+    pub(super) reason: Option<LaneChangeReason>,
     pub(super) time_s: f64,
 }
 
@@ -170,6 +172,7 @@ impl Here {
 #[derive(Debug, Serialize)]
 pub(super) struct Planned<'a> {
     maneuver: Maneuver,
+    reason: Option<LaneChangeReason>,
     refusal: Option<LaneChangeRefusal>,
     speed_status: PlanStatus,
     reference_speed_m_s: f64,
@@ -188,6 +191,7 @@ impl<'a> From<&'a Plan> for Planned<'a> {
     fn from(p: &'a Plan) -> Self {
         Self {
             maneuver: p.maneuver,
+            reason: p.reason,
             refusal: p.refusal,
             speed_status: p.speed_status,
             reference_speed_m_s: round(p.reference_speed_m_s, 1e3),

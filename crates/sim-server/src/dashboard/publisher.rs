@@ -131,8 +131,9 @@ impl Recorder for Publisher {
         kept.ego = *tick.ego;
         kept.plan.clone_from(tick.plan);
         kept.scene.clone_from(tick.scene);
-        if let Some(reason) = tick.plan.refusal {
-            kept.last_refusal = Some(Refused { reason, time_s: tick.now.seconds() });
+        if let Some(refusal) = tick.plan.refusal {
+            let (reason, time_s) = (tick.plan.reason, tick.now.seconds());
+            kept.last_refusal = Some(Refused { refusal, reason, time_s });
         }
         let mut strip = self.shared.strip();
         if strip.is_due(tick) {

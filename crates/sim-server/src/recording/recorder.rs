@@ -39,6 +39,8 @@ const FLUSH_PERIOD: Time = Time(1_000_000_000);
 
 /// The lane lines around the truck are repeated this often, for viewers that join or jump.
 const LANES_PERIOD: Time = Time(10_000_000_000);
+/// At the start they are written for so much of the road, m: 2.4 MB of points for two lanes.
+const LANES_AT_START_M: f64 = 100_000.0;
 /// How far around the truck they are repeated, m.
 const LANES_BEHIND_M: f64 = 500.0;
 const LANES_AHEAD_M: f64 = 1500.0;
@@ -150,6 +152,7 @@ impl Recorder for Recording {
                 speed: Vec::new(),
                 guard: p.guard.clone(),
                 maneuver: p.maneuver,
+                reason: p.reason,
                 refusal: p.refusal,
                 speed_status: p.speed_status,
                 reference_speed_m_s: p.reference_speed_m_s,
@@ -219,7 +222,10 @@ impl Tracks {
             lanes_due: LANES_PERIOD,
         };
         let length_m = tracks.scenery.road.length_m();
-        tracks.write_lanes(Time::ZERO, &(0.0..length_m))?;
+        tracks.write_lanes(Time::ZERO, &(0.0..length_m.min(LANES_AT_START_M)))?;
+        if length_m > LANES_AT_START_M {
+            tracks.lanes_due = Time::ZERO;
+        }
         tracks.file.flush()?;
         Ok(tracks)
     }

@@ -89,11 +89,13 @@ function show(f) {
 
 // What the truck does and why.
 function decision({ plan, run, time_s }) {
-  text("maneuver", words.maneuver(plan.maneuver));
+  text("maneuver", words.maneuver(plan.maneuver) + (plan.reason && plan.maneuver !== "keep_lane" ? `: ${words.reason(plan.reason)}` : ""));
   text("speed-by", words.speedBy(plan));
-  const ago = run.last_refusal ? time_s - run.last_refusal.time_s : Infinity;
+  const refused = run.last_refusal, ago = refused ? time_s - refused.time_s : Infinity;
   $("refusal").hidden = ago > REFUSAL_SHOWN_S;
-  if (ago <= REFUSAL_SHOWN_S) text("refusal", `No lane change ${ago < 1 ? "now" : `${ago.toFixed(0)} s ago`}: ${words.refusal(run.last_refusal.reason)}`);
+  if (ago > REFUSAL_SHOWN_S) return;
+  const wish = refused.reason ? ` (${words.reason(refused.reason)})` : "";
+  text("refusal", `Lane change${wish} refused ${ago < 1 ? "now" : `${ago.toFixed(0)} s ago`}: ${words.refusal(refused.refusal)}`);
 }
 
 function traffic({ lead }) {

@@ -18,6 +18,14 @@ export const maneuver = from({
   minimal_risk: "Brakes within its lane: minimal risk",
 });
 
+export const reason = from({
+  lane_ends: "its lane ends",
+  slower_ahead: "the vehicle ahead is slower",
+  keep_right: "the right lane serves as well",
+  policy: "the learned policy chose it",
+  requested: "asked for from outside",
+});
+
 export const refusal = from({
   no_target_lane: "there is no lane on that side",
   unsafe_front: "the gap ahead in the target lane is too small",

@@ -113,6 +113,7 @@ pub(crate) struct PlanState {
     is_following: bool,
     following_id: u64,
     guard: Vec<String>,
+    reason: String,
 }
 
 impl PlanState {
@@ -132,6 +133,7 @@ impl PlanState {
             is_following: plan.following.is_some(),
             following_id: plan.following.unwrap_or_default(),
             guard: plan.guard.iter().map(word).collect(),
+            reason: plan.reason.as_ref().map(word).unwrap_or_default(),
         }
     }
 }
