@@ -77,6 +77,8 @@ pub struct PowertrainLimits {
     pub idle_speed_rad_s: f64,
     /// Highest governed speed, rad/s.
     pub max_speed_rad_s: f64,
+    /// Lowest engine speed at which a gear is kept under power, rad/s: the gearbox's own limit.
+    pub lugging_speed_rad_s: f64,
     /// Fuel flow.
     pub fuel: FuelModel,
     /// Fuel flow at idle with the driveline open, g/s.

@@ -25,6 +25,7 @@ impl VehicleLimits {
     /// | `wheel_radius_m` | 0.1 to 2 | the largest tyre made has 2.0 m |
     /// | `idle_speed_rad_s` | 1 to 300 | 300 rad/s are 2 865 rpm; an idle speed in rpm is refused |
     /// | `max_speed_rad_s` | above 1.25 times idle, up to 1000 | below it no gear has a range to drive in |
+    /// | `lugging_speed_rad_s` | idle to highest speed | the gearbox keeps no gear under power below it |
     /// | gear ratios | 0.1 to 100 | overdrive; crawler with splitter and range |
     /// | gear efficiencies | 0.3 to 1 | below it the overrun drag of a gear exceeds its traction |
     /// | `max_decel_m_s2` | 0.5 to 12.5 | the legal minimum of a worn truck is 4.5 (ECE R13); 12.5 is a tyre's limit |
@@ -94,6 +95,12 @@ impl VehicleLimits {
             ("powertrain.wheel_radius_m", p.wheel_radius_m, 0.1, 2.0),
             ("powertrain.idle_speed_rad_s", p.idle_speed_rad_s, 1.0, 300.0),
             ("powertrain.max_speed_rad_s", p.max_speed_rad_s, slowest, 1000.0),
+            (
+                "powertrain.lugging_speed_rad_s",
+                p.lugging_speed_rad_s,
+                p.idle_speed_rad_s,
+                p.max_speed_rad_s,
+            ),
             ("powertrain.auxiliary_power_w", p.auxiliary_power_w, 0.0, 1e6),
             ("powertrain.idle_fuel_g_s", p.idle_fuel_g_s, 0.0, 100.0),
             ("powertrain.rotating_mass_neutral_kg", p.rotating_mass_neutral_kg, 0.0, 1e6),

@@ -191,6 +191,7 @@ impl TruckModel {
                 auxiliary_power_w: e.auxiliary_power_w,
                 idle_speed_rad_s: idle,
                 max_speed_rad_s: self.engine.max_rad_s,
+                lugging_speed_rad_s: p.shift.lugging_rpm() / RPM_PER_RAD_S,
                 fuel: self.engine.fuel.clone(),
                 idle_fuel_g_s: self.engine.fuel_rate_g_s(idle, holding),
                 shift_duration_s: p.shift.duration_scale_coeff

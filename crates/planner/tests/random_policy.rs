@@ -188,6 +188,9 @@ fn with_the_weakest_gaps_that_can_be_configured_the_same_policy_does_collide() {
     weak.rss.car_behind.brake_min_m_s2 = 4.0;
     weak.lane_change.time_to_collision_s = 0.0;
     weak.following.headway_s = 0.5;
+    weak.following.standstill_gap_m = 1.0;
+    weak.following.safe_gap_margin_m = 0.0;
+    weak.following.emergency_extra_m_s2 = 0.0;
     let t = campaign(5_000, &weak);
     assert!(t.ego_caused > 0, "{t:?}");
 }

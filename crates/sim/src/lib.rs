@@ -8,8 +8,10 @@
 //! Left out on purpose: clocks and pacing, sockets, files other than scenarios, roads and trucks.
 
 mod collision;
+mod drivability;
 mod error;
 mod ghost;
+mod lead;
 mod memory;
 mod metrics;
 mod off_road;
@@ -23,8 +25,10 @@ mod traffic_section;
 mod world;
 
 pub use collision::{Footprint, footprints_overlap};
+pub use drivability::{Drivability, Drive, Spread};
 pub use error::SimError;
 pub use ghost::{Ghost, GhostReport};
+pub use lead::LeadVehicle;
 pub use memory::{MemoryRecord, MemoryRecorder};
 pub use metrics::{Metrics, Summary};
 pub use off_road::OffRoad;

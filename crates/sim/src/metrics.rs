@@ -148,6 +148,12 @@ impl Metrics {
         }
     }
 
+    /// Collisions so far.
+    #[must_use]
+    pub const fn collisions(&self) -> u32 {
+        self.collisions
+    }
+
     /// Vehicles that touch the ego now; a new contact counts one collision.
     fn count_collisions(&mut self, tick: &Tick<'_>) {
         let near_m = self.geometry.length_m() + 30.0;

@@ -221,6 +221,12 @@ impl World {
         }
     }
 
+    /// Collisions of the ego so far.
+    #[must_use]
+    pub const fn collisions(&self) -> u32 {
+        self.metrics.collisions()
+    }
+
     /// Time of the next tick.
     #[must_use]
     pub const fn now(&self) -> Time {

@@ -37,6 +37,10 @@ pub struct DrivelineParameters {
     /// Time from the pedal to the clutch's touch point on launch, s.
     #[serde(default)]
     pub clutch_delay_s: f64,
+    /// Engine speed at which the clutch opens whatever the pedal, rpm; none = a controlled clutch,
+    /// which opens above idle speed under a released pedal and slips at it under power.
+    #[serde(default)]
+    pub clutch_opens_rpm: Option<f64>,
     /// Gear for pulling away.
     pub launch_gear: u8,
     /// Secondary retarder: largest torque at the propeller shaft, Nm.
@@ -105,6 +109,7 @@ impl DrivelineParameters {
         b.within("clutch_torque_nm", self.clutch_torque_nm, 100.0, 20_000.0);
         b.within("clutch_closing_s", self.clutch_closing_s, 0.05, 10.0);
         b.within("clutch_delay_s", self.clutch_delay_s, 0.0, 5.0);
+        b.within("clutch_opens_rpm", self.clutch_opens_rpm.unwrap_or(600.0), 200.0, 1_500.0);
         b.within("launch_gear", f64::from(self.launch_gear), 1.0, n.max(1) as f64);
         b.within("retarder_torque_nm", self.retarder_torque_nm, 0.0, 10_000.0);
         b.within("retarder_power_w", self.retarder_power_w, 0.0, 1e6);

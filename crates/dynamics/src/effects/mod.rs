@@ -9,3 +9,4 @@ pub mod instruments;
 pub mod resistance;
 pub mod shift;
 pub mod table;
+pub mod tcu;

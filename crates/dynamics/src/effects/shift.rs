@@ -2,14 +2,12 @@
 //!
 //! A shift ramps the torque down, opens the driveline, changes the gear while the engine is
 //! brought to its new speed, and ramps the torque up again. Two schedules: thresholds of engine
-//! speed that rise with the pedal and look whether the new gear can carry the present power (so
-//! that a loaded truck on a climb does not hunt), or a map of road speed over gear and pedal.
-//! Skip shifts take the highest gear whose condition holds; after a shift the gear is held.
+//! speed that rise with the pedal, judged by the speed that the truck will have after the shift
+//! ([`super::tcu`]), or a map of road speed over gear and pedal. After a shift the gear is held.
 
-use serde::{Deserialize, Serialize};
-use tractrix_core::{Curve, RPM_PER_RAD_S};
-
+use super::tcu::{self, TcuView};
 use crate::bounds::Bounds;
+use serde::{Deserialize, Serialize};
 
 /// The shift block of a truck file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -37,6 +35,14 @@ pub struct ShiftParameters {
     pub down_speed_rpm: [f64; 2],
     /// Engine speed that the gearbox keeps while the engine brake works, rpm.
     pub braking_speed_rpm: f64,
+    /// Time for which a shift is not taken back, s, unless the engine would lug, stall or overspeed
+    /// (schedule by engine speed).
+    #[serde(default = "reversal_hold_s")]
+    pub reversal_hold_s: f64,
+    /// Lowest engine speed at which a gear is kept under power, rpm; none = 1.1 times the
+    /// down-shift speed at pedal 0. Planners keep the same limit.
+    #[serde(default)]
+    pub lugging_speed_rpm: Option<f64>,
     /// Schedule by road speed instead.
     #[serde(default)]
     pub speed_map: Option<SpeedMap>,
@@ -63,10 +69,11 @@ pub struct SpeedMap {
 fn one() -> f64 {
     1.0
 }
+fn reversal_hold_s() -> f64 {
+    8.0
+}
 
-/// From this pedal on a gear does not rest: the driver or the planner wants power.
-const KICK_DOWN_FRAC: f64 = 0.9;
-/// Lowest engine speed at which a gear rests, relative to the down-shift speed at pedal 0.
+/// Lugging limit of a truck file that gives none, relative to the down-shift speed at pedal 0.
 const LUGGING_FACTOR: f64 = 1.1;
 
 /// Where a shift stands.
@@ -90,6 +97,8 @@ pub struct ShiftState {
     pub gear: u8,
     /// Gear being engaged.
     pub target: u8,
+    /// Gear before the last shift, 0 = none or neutral.
+    pub from: u8,
     /// Phase of the shift.
     pub phase: ShiftPhase,
     /// Time in the phase, s.
@@ -98,27 +107,6 @@ pub struct ShiftState {
     pub since_shift_s: f64,
     /// How long a down-shift condition has held, s.
     pub down_s: f64,
-}
-
-/// What the TCU looks at.
-#[derive(Debug, Clone, Copy)]
-pub struct TcuView<'a> {
-    /// Road speed, m/s.
-    pub speed_m_s: f64,
-    /// Pedal, 0 to 1.
-    pub pedal_frac: f64,
-    /// Engine brake and retarder demand, 0 to 1.
-    pub retarder_frac: f64,
-    /// Service brake demand, m/s².
-    pub brake_decel_m_s2: f64,
-    /// Brake power that the engine gives now, W.
-    pub power_w: f64,
-    /// Engine speed per road speed in each gear, rad/m.
-    pub ratio_rad_m: &'a [f64],
-    /// Full-load brake torque over engine speed, Nm.
-    pub full_load_nm: &'a Curve,
-    /// Highest engine speed, rad/s.
-    pub max_rad_s: f64,
 }
 
 impl ShiftParameters {
@@ -130,10 +118,12 @@ impl ShiftParameters {
         b.within("duration_scale_coeff", self.duration_scale_coeff, 0.05, 10.0);
         b.within("ramp_floor_nm", self.ramp_floor_nm.unwrap_or(0.0), 0.0, 5_000.0);
         b.within("hold_s", self.hold_s, 0.0, 30.0);
+        b.within("reversal_hold_s", self.reversal_hold_s, 0.0, 60.0);
         for (key, pair) in [
             ("up_speed_rpm", self.up_speed_rpm),
             ("down_speed_rpm", self.down_speed_rpm),
             ("braking_speed_rpm", [self.braking_speed_rpm; 2]),
+            ("lugging_speed_rpm", [self.lugging_rpm(); 2]),
         ] {
             for v in pair {
                 b.within(key, v, 300.0, 5_000.0);
@@ -154,6 +144,12 @@ impl ShiftParameters {
             b.within("speed_map.skip_pedal_frac", map.skip_pedal_frac, 0.0, 2.0);
         }
         b.violations
+    }
+
+    /// Lowest engine speed at which a gear is kept under power, rpm.
+    #[must_use]
+    pub fn lugging_rpm(&self) -> f64 {
+        self.lugging_speed_rpm.unwrap_or(LUGGING_FACTOR * self.down_speed_rpm[0])
     }
 
     /// Length of a phase, s.
@@ -181,12 +177,13 @@ impl ShiftParameters {
         }
     }
 
-    /// The gear that the schedule wants now; the present one if nothing changes.
+    /// The gear that the schedule wants now, the present one if nothing changes, and how long it
+    /// must have wanted a lower one, s.
     #[must_use]
-    pub fn wanted_gear(&self, state: &ShiftState, view: &TcuView<'_>) -> u8 {
+    pub(crate) fn wanted_gear(&self, state: &ShiftState, view: &TcuView<'_>) -> (u8, f64) {
         match &self.speed_map {
-            Some(map) => map.wanted_gear(state, view),
-            None => self.by_engine_speed(state, view),
+            Some(map) => (map.wanted_gear(state, view), map.down_hold_s),
+            None => tcu::wanted_gear(self, state, view),
         }
     }
 
@@ -198,58 +195,6 @@ impl ShiftParameters {
         if again != state.target && (again > state.target) == (state.target > state.gear) {
             state.target = again;
         }
-    }
-
-    /// Whether the schedule sees a reason to shift down (before any hold time).
-    fn by_engine_speed(&self, state: &ShiftState, view: &TcuView<'_>) -> u8 {
-        let gear = state.gear;
-        let top = view.ratio_rad_m.len();
-        let speed_in = |g: usize| view.speed_m_s * view.ratio_rad_m[g - 1];
-        let at = |pair: [f64; 2]| (pair[0] + view.pedal_frac * (pair[1] - pair[0])) / RPM_PER_RAD_S;
-        let now = usize::from(gear).clamp(1, top);
-        let n = speed_in(now);
-        let braking = view.retarder_frac > 0.3 || view.brake_decel_m_s2 > 0.8;
-        let (up, down) = if braking {
-            (0.97 * view.max_rad_s, self.braking_speed_rpm / RPM_PER_RAD_S)
-        } else if view.retarder_frac > 0.0 {
-            // A demand that has fallen because the lower gear brakes better is no reason to leave it.
-            (0.97 * view.max_rad_s, at(self.down_speed_rpm))
-        } else {
-            (at(self.up_speed_rpm), at(self.down_speed_rpm))
-        };
-        let carries = |g: usize| {
-            let n = speed_in(g);
-            n > 1.0 && view.power_w / n < 0.92 * view.full_load_nm.at(n)
-        };
-        // A gear rests where it carries the present power without kick-down and above lugging. The
-        // next gear is taken early if it would rest, and a gear that rests is kept.
-        let rests_in = |g: usize, margin: f64| {
-            let speed = speed_in(g);
-            let pedal = view.pedal_frac * n / speed.max(1.0);
-            let lugging = LUGGING_FACTOR * self.down_speed_rpm[0] / RPM_PER_RAD_S;
-            !braking && pedal * margin < KICK_DOWN_FRAC && speed > margin * lugging && carries(g)
-        };
-        if now < top && n <= up && view.pedal_frac > 0.0 && rests_in(now + 1, 1.05) {
-            return gear + 1;
-        }
-        if n < down && rests_in(now, 1.0) {
-            return gear;
-        }
-        if n > up && now < top {
-            let fits = |g: &usize| {
-                speed_in(*g) > 1.03 * down && (carries(*g) || n > 0.96 * view.max_rad_s)
-            };
-            let highest = (now + 1..=(now + 2).min(top)).rev().find(fits);
-            return highest.map_or(gear, |g| g as u8);
-        }
-        if n < down && now > 1 {
-            let fits = |g: &usize| speed_in(*g) < 0.97 * up.min(view.max_rad_s);
-            let lowest = (now.saturating_sub(2).max(1)..now).find(fits);
-            let one = now - 1;
-            let deep = if n < 0.9 * down { lowest } else { None };
-            return deep.unwrap_or(one) as u8;
-        }
-        gear
     }
 }
 

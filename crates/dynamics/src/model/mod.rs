@@ -132,7 +132,7 @@ impl TruckModel {
             distance_m: 0.0,
             substeps: 0,
             engine_speed_rad_s: geared.max(idle),
-            engine_torque_nm: self.engine.friction_nm(idle),
+            engine_torque_nm: self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, false),
             engine_brake_nm: 0.0,
             retarder_nm: 0.0,
             clutch_locked: locked,
@@ -207,7 +207,7 @@ impl TruckModel {
             patch.altitude_m,
             patch.air_temperature_k,
         );
-        self.shift(s, pedal, decel, command);
+        self.shift(s, pedal, decel, full_load_nm, command);
         self.engine_torque(s, pedal, full_load_nm, command.retarder_frac.clamp(0.0, 1.0));
         let wheel = self.driveline(s, pedal);
         self.service_brakes(s, decel, patch);

@@ -1,11 +1,20 @@
 //! Demand to wheels: gearbox, engine, engine brake, retarder, clutch.
 
-use tractrix_core::{Command, GearRequest};
+use tractrix_core::{Command, GearRequest, RPM_PER_RAD_S};
 
 use super::{STANDSTILL_M_S, TruckModel};
 use crate::effects::cooling::CoolingParameters;
-use crate::effects::shift::{ShiftPhase, ShiftState, TcuView};
+use crate::effects::driveline::RELEASED_PEDAL_FRAC;
+use crate::effects::shift::{ShiftPhase, ShiftState};
+use crate::effects::tcu::{self, TcuView};
 use crate::state::{SUBSTEP_S, TruckState};
+
+/// Engine speed below which the idle governor works, relative to idle speed.
+const GOVERNED_FRAC: f64 = 1.15;
+/// Engine speed above which the clutch is closed after a shift, relative to that at which it opens.
+const LOCKS_FRAC: f64 = 17.0 / 16.0;
+/// Engine speed at which the clutch opens under a released pedal, relative to idle speed.
+const RELEASE_FRAC: f64 = 1.05;
 
 /// What the driveline does at the wheels: its force, and the gear whose inertia it carries (0 =
 /// open or slipping).
@@ -16,22 +25,19 @@ pub(super) struct Wheel {
 
 impl TruckModel {
     /// Gearbox: starts, advances and ends shifts.
-    pub(super) fn shift(&self, s: &mut TruckState, pedal: f64, decel: f64, command: &Command) {
+    pub(super) fn shift(
+        &self,
+        s: &mut TruckState,
+        pedal: f64,
+        decel: f64,
+        full_load_nm: f64,
+        command: &Command,
+    ) {
         let p = &self.parameters.shift;
+        let view = self.tcu_view(s, pedal, decel, full_load_nm, command);
         let state = &mut s.shift;
         state.phase_s += SUBSTEP_S;
         state.since_shift_s += SUBSTEP_S;
-        let view = TcuView {
-            speed_m_s: s.speed_m_s,
-            pedal_frac: pedal,
-            retarder_frac: command.retarder_frac,
-            brake_decel_m_s2: decel,
-            power_w: (s.engine_torque_nm - self.engine.friction_nm(s.engine_speed_rad_s)).max(0.0)
-                * s.engine_speed_rad_s,
-            ratio_rad_m: &self.ratio_rad_m,
-            full_load_nm: &self.engine.full_load_nm,
-            max_rad_s: self.engine.max_rad_s,
-        };
         match state.phase {
             ShiftPhase::Engaged => {
                 let wanted = self.wanted_gear(state, &view, command.gear);
@@ -51,12 +57,19 @@ impl TruckModel {
             }
             ShiftPhase::Open if state.phase_s >= p.phase_length_s(ShiftPhase::Open) => {
                 p.retarget(state, &view);
+                state.from = state.gear;
                 state.gear = state.target;
                 state.phase = ShiftPhase::RampUp;
                 state.phase_s = 0.0;
                 let geared = self.parameters.driveline.engine_speed_rad_s(s.speed_m_s, state.gear);
-                s.clutch_locked = state.gear > 0 && geared > 0.85 * self.engine.idle_rad_s;
+                let controlled = self.parameters.driveline.clutch_opens_rpm.is_none();
+                let locks = LOCKS_FRAC * self.clutch_opens_rad_s();
+                s.clutch_locked = state.gear > 0 && geared > locks;
                 s.clutch_frac = if s.clutch_locked { 1.0 } else { 0.0 };
+                if controlled && geared < GOVERNED_FRAC * self.engine.idle_rad_s {
+                    // The idle governor has held the engine while the driveline was open.
+                    s.engine_torque_nm = self.holding_nm(s);
+                }
             }
             ShiftPhase::RampUp if state.phase_s >= p.phase_length_s(ShiftPhase::RampUp) => {
                 state.phase = ShiftPhase::Engaged;
@@ -65,6 +78,49 @@ impl TruckModel {
             }
             _ => {}
         }
+    }
+
+    /// What the gearbox's control unit knows.
+    fn tcu_view<'a>(
+        &'a self,
+        s: &TruckState,
+        pedal: f64,
+        decel: f64,
+        full_load_nm: f64,
+        command: &Command,
+    ) -> TcuView<'a> {
+        let (e, d, f) = (&self.engine, &self.parameters.driveline, &s.forces);
+        let n = s.engine_speed_rad_s;
+        let demand = e.governed_nm(e.pedal_demand_nm(pedal, n, full_load_nm), n, full_load_nm);
+        let free_n = f.effective_mass_kg * s.accel_m_s2 - f.drive_n;
+        TcuView {
+            speed_m_s: s.speed_m_s,
+            accel_m_s2: s.accel_m_s2,
+            open_accel_m_s2: free_n / self.mass_kg,
+            mass_kg: self.mass_kg,
+            efficiency_frac: d.efficiency_frac(),
+            pedal_frac: pedal,
+            retarder_frac: command.retarder_frac,
+            brake_decel_m_s2: decel,
+            demand_nm: demand - e.friction_nm(n),
+            ratio_rad_m: &self.ratio_rad_m,
+            full_load_nm: &e.full_load_nm,
+            idle_rad_s: e.idle_rad_s,
+            max_rad_s: e.max_rad_s,
+            lowest_gear: d.launch_gear,
+        }
+    }
+
+    /// Engine speed at which the clutch opens under power, rad/s.
+    fn clutch_opens_rad_s(&self) -> f64 {
+        let opens = self.parameters.driveline.clutch_opens_rpm;
+        opens.map_or(self.engine.idle_rad_s, |rpm| rpm / RPM_PER_RAD_S)
+    }
+
+    /// Torque with which the idle governor holds the engine, Nm.
+    fn holding_nm(&self, s: &TruckState) -> f64 {
+        let n = s.engine_speed_rad_s;
+        self.engine.friction_nm(n) + self.engine.auxiliary_nm(n, s.fan_runs)
     }
 
     /// What request and schedule want, within the engine's range and the hold time.
@@ -84,19 +140,17 @@ impl TruckModel {
             _ => {}
         }
         if state.gear == 0 {
-            let highest =
-                (1..=view.ratio_rad_m.len() as u8).rev().find(|&g| speed_in(g) > 1.6 * lowest);
-            return highest.unwrap_or(self.parameters.driveline.launch_gear);
+            return tcu::gear_from_neutral(p, view);
         }
         if view.speed_m_s < STANDSTILL_M_S {
             return self.parameters.driveline.launch_gear;
         }
-        let wanted = p.wanted_gear(state, view).max(self.parameters.driveline.launch_gear);
+        let (wanted, down_hold_s) = p.wanted_gear(state, view);
+        let wanted = wanted.max(self.parameters.driveline.launch_gear);
         let urgent = wanted < state.gear && speed_in(state.gear) < 1.1 * self.engine.idle_rad_s;
         if wanted < state.gear {
             state.down_s += SUBSTEP_S;
-            let hold = p.speed_map.as_ref().map_or(0.0, |m| m.down_hold_s);
-            if state.down_s < hold {
+            if state.down_s < down_hold_s {
                 return state.gear;
             }
         } else {
@@ -115,7 +169,7 @@ impl TruckModel {
     ) {
         let (e, p) = (&self.engine, &self.parameters.engine);
         let n = s.engine_speed_rad_s;
-        let holding = e.friction_nm(n) + e.auxiliary_nm(n, s.fan_runs);
+        let holding = self.holding_nm(s);
         let wanted = e.pedal_demand_nm(pedal, n, full_load_nm);
         let mut demand = e.governed_nm(wanted, n, full_load_nm);
         let shift = &self.parameters.shift;
@@ -124,8 +178,11 @@ impl TruckModel {
             demand = demand.min(floor);
         }
         let idle = holding + 6.0 * (e.idle_rad_s - n);
-        let target =
-            if n < 1.15 * e.idle_rad_s { demand.max(idle.clamp(0.0, 700.0)) } else { demand };
+        let target = if n < GOVERNED_FRAC * e.idle_rad_s {
+            demand.max(idle.clamp(0.0, 700.0))
+        } else {
+            demand
+        };
         let rise = p.torque_rise_nm_s.map_or(f64::INFINITY, |r| r * SUBSTEP_S);
         let fall = p.torque_fall_nm_s.map_or(f64::INFINITY, |r| r * SUBSTEP_S);
         let lag = e.lag_s(s.engine_torque_nm, target, full_load_nm);
@@ -160,9 +217,13 @@ impl TruckModel {
             - s.engine_brake_nm;
         let geared = d.engine_speed_rad_s(s.speed_m_s, gear);
         let open = s.shift.phase == ShiftPhase::Open || gear == 0;
-        if s.clutch_locked && geared < 0.8 * self.engine.idle_rad_s {
+        // Released it opens early enough for the idle governor to catch the engine; driving it slips.
+        let released = pedal <= RELEASED_PEDAL_FRAC;
+        let controlled = d.clutch_opens_rpm.is_none();
+        let early = if controlled && released { RELEASE_FRAC } else { 1.0 };
+        if s.clutch_locked && geared < early * self.clutch_opens_rad_s() {
             s.clutch_locked = false;
-            s.clutch_frac = 0.0;
+            s.clutch_frac = if controlled && !released { 1.0 } else { 0.0 };
         }
         if s.clutch_locked && !open {
             return Wheel { drive_n: d.force_n(crank_nm, gear), gear };
@@ -174,7 +235,7 @@ impl TruckModel {
             s.engine_speed_rad_s += (goal - n) * (rate * SUBSTEP_S).min(1.0);
             return Wheel { drive_n: 0.0, gear: 0 };
         }
-        let closing = if pedal > 0.01 { 1.0 } else { -2.0 };
+        let closing = if released { -2.0 } else { 1.0 };
         s.clutch_frac = (s.clutch_frac + closing * SUBSTEP_S / d.clutch_closing_s)
             .clamp(-d.clutch_delay_s / d.clutch_closing_s, 1.0);
         let held = crank_nm.max(0.0) + 15.0 * (n - self.engine.idle_rad_s);

@@ -37,7 +37,9 @@ pub struct RssConfig {
     pub ego_processing_s: f64,
     /// Largest acceleration of the ego during its reaction, m/s².
     pub ego_accel_max_m_s2: f64,
-    /// Share of the ego's largest deceleration that is counted on, 0 to 1.
+    /// Share of the ego's largest deceleration that is counted on, 0 to 1. The rest is the margin for
+    /// what a planner does not see: hot linings, worn tyres, an axle out of adjustment. It is no
+    /// margin for a wet or icy road: the largest deceleration is the one of a dry road.
     pub ego_brake_use_frac: f64,
     /// Hardest deceleration of the ego as seen by a vehicle behind it, m/s².
     pub ego_brake_max_m_s2: f64,
@@ -52,7 +54,7 @@ pub struct RssConfig {
 }
 
 impl Default for RssConfig {
-    /// Ego: 0.2 s processing, 80 % of its braking; cars ahead brake with 8 m/s², trucks with 6;
+    /// Ego: 0.3 s processing (three 0.1 s cycles of prediction and gate), 80 % of its braking; cars ahead brake with 8 m/s², trucks with 6;
     /// cars behind react in 1.2 s and brake with 4 m/s², trucks in 1.3 s with 3.5.
     fn default() -> Self {
         Self {

@@ -8,15 +8,18 @@
 //! | `v_s` | m/s | largest speed for which `s` is a safe gap |
 //!
 //! Three requests, the lowest wins. (1) IDM with `s* = max(s_0 + v T, d_safe + margin)` and its
-//! approach term. (2) Keep `v <= v_s`: `v_s` falls by `(v - v_f)/(rho + v/b)` per second, so that
+//! approach term; it brakes no harder than half as much again as meets the speed ahead in time. (2) Keep `v <= v_s`: `v_s` falls by `(v - v_f)/(rho + v/b)` per second, so that
 //! deceleration is fed forward and the excess `v - v_s` is taken off gently: somebody who cuts in
 //! ahead, and drives as fast, is given room without hard braking. (3) If even a vehicle ahead that
 //! brakes only `emergency_extra_m_s2` harder than it does now would be hit, brake with all that is
-//! there. Nothing here brakes merely because a vehicle is in sight: the paper's Algorithm 1 does.
+//! there. The request may change with the comfortable jerk as long as a comfortable deceleration
+//! suffices, faster with the square of what is needed beyond it, and freely in an emergency.
+//! Nothing here brakes merely because a vehicle is in sight: the paper's Algorithm 1 does.
 
 use crate::PlannerError;
 use crate::error::config_in;
 use crate::safety::{RearResponse, SafeGap};
+use driver_models::Idm;
 use serde::{Deserialize, Serialize};
 
 /// Car-following parameters.
@@ -97,6 +100,9 @@ pub(crate) struct Lead {
 pub(crate) struct Following {
     /// Acceleration not to be exceeded, m/s².
     pub accel_m_s2: f64,
+    /// Factor on the comfortable jerk with which the truck may answer, from 1; infinite in an
+    /// emergency.
+    pub haste: f64,
     /// The gap is below the safe gap.
     pub below_safe_gap: bool,
     /// Emergency braking.
@@ -108,11 +114,7 @@ pub(crate) struct Following {
 pub(crate) fn steady_gap_m(config: &FollowingConfig, ego: &RearResponse, lead: &Lead) -> f64 {
     let v = lead.speed_m_s.max(0.0);
     let safe_m = SafeGap::new(ego, lead.brake_max_m_s2, 0.0).gap_m(v, v);
-    wanted_gap_m(config, v * config.headway_s, safe_m)
-}
-
-fn wanted_gap_m(config: &FollowingConfig, headway_m: f64, safe_m: f64) -> f64 {
-    (config.standstill_gap_m + headway_m.max(0.0)).max(safe_m + config.safe_gap_margin_m)
+    (config.standstill_gap_m + v * config.headway_s).max(safe_m + config.safe_gap_margin_m)
 }
 
 /// Largest acceleration that keeps the gap to `lead`, at own `speed_m_s` on `grade_rad`.
@@ -130,10 +132,9 @@ pub(crate) fn follow(
     let d_safe = safe.gap_m(v, v_f);
 
     let (a, b) = (config.accel_m_s2, config.comfort_decel_m_s2);
-    let approach = v * (v - v_f) / (2.0 * libm::sqrt(a * b));
-    let wanted = wanted_gap_m(config, v * config.headway_s + approach, d_safe);
-    let ratio = wanted / gap.max(0.1);
-    let idm = a * (1.0 - ratio * ratio);
+    let driver = Idm::new(f64::INFINITY, config.headway_s, config.standstill_gap_m, a, b, hardest);
+    let wanted = driver.wanted_gap_m(v, v - v_f).max(d_safe + config.safe_gap_margin_m);
+    let idm = a + driver.hindrance_m_s2(wanted, gap);
 
     let margin = if lead.being_left { 0.0 } else { 0.5 * config.safe_gap_margin_m };
     let room = gap - margin;
@@ -154,10 +155,18 @@ pub(crate) fn follow(
     let acting = RearResponse { accel_max_m_s2: 0.0, ..*ego };
     let emergency =
         v > 0.1 && lead.in_path && gap < SafeGap::new(&acting, plausible, grade_rad).gap_m(v, v_f);
-    let comfort = if lead.being_left { a } else { idm.max(-2.0 * b) };
+    // What meets the speed ahead, and its braking, before half the standstill gap is used up.
+    let closing = (v - v_f).max(0.0);
+    let room_to_close = (gap - 0.5 * config.standstill_gap_m).max(0.5);
+    let needed = brakes_now.min(hardest) + closing * closing / (2.0 * room_to_close);
+    let gentle = (0.5 * b).max(1.5 * needed).min(2.0 * b);
+    let comfort = if lead.being_left { a } else { idm.max(-gentle) };
     let accel = if emergency { -hardest } else { comfort.min(restore) };
+    let pressing = (needed / b).max(1.0);
+    let haste = if emergency { f64::INFINITY } else { pressing * pressing };
     Following {
         accel_m_s2: accel.clamp(-hardest.max(b), a),
+        haste,
         below_safe_gap: gap < d_safe,
         emergency,
     }

@@ -6,19 +6,25 @@
 //! the retarder what is below it, the service brake (XBR) what the retarder cannot. Changing
 //! between driving and braking needs a margin (`band_m_s2`) and a dwell time, except in an
 //! emergency. The integrator rests while an actuator is at its end, while traffic rules and while
-//! the gearbox shifts (anti-windup).
+//! the gearbox shifts (anti-windup). The wanted acceleration changes at most with the jerk that
+//! traffic allows, the comfortable one by default. At standstill the brakes hold the truck until the
+//! clutch carries it.
 
 use super::road_load::{InGear, effective_mass_kg, resistance_n};
 use crate::PlannerError;
 use crate::error::config_in;
 use serde::{Deserialize, Serialize};
-use tractrix_core::{BrakeMode, EgoState, VehicleLimits};
+use tractrix_core::{BrakeMode, EgoState, GRAVITY_M_S2, VehicleLimits};
 
 /// A rolling truck is this much faster or slower than its reference before it brakes or drives,
 /// m/s. The next plan starts from where it is.
 const COAST_FAST_M_S: f64 = 0.3;
 /// See [`COAST_FAST_M_S`].
 const COAST_SLOW_M_S: f64 = 0.5;
+/// Speed below which the brakes hold the truck, m/s.
+const STANDS_M_S: f64 = 0.1;
+/// Deceleration that holds it on the level, m/s².
+const HOLD_M_S2: f64 = 0.4;
 
 /// Speed-control parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -44,6 +50,8 @@ pub struct LongitudinalConfig {
     pub pedal_rate_1_s: f64,
     /// Share of the retarder used before the service brake helps, 0 to 1.
     pub retarder_use_frac: f64,
+    /// Comfortable jerk: rate at which the wanted acceleration changes while nothing presses, m/s³.
+    pub jerk_m_s3: f64,
 }
 
 impl Default for LongitudinalConfig {
@@ -59,6 +67,7 @@ impl Default for LongitudinalConfig {
             urgent_decel_m_s2: 1.0,
             pedal_rate_1_s: 1.2,
             retarder_use_frac: 0.95,
+            jerk_m_s3: 0.8,
         }
     }
 }
@@ -78,7 +87,8 @@ impl LongitudinalConfig {
         config_in("longitudinal.dwell_s", self.dwell_s, 0.0, 10.0)?;
         config_in("longitudinal.urgent_decel_m_s2", self.urgent_decel_m_s2, 0.1, 5.0)?;
         config_in("longitudinal.pedal_rate_1_s", self.pedal_rate_1_s, 0.05, 100.0)?;
-        config_in("longitudinal.retarder_use_frac", self.retarder_use_frac, 0.0, 1.0)
+        config_in("longitudinal.retarder_use_frac", self.retarder_use_frac, 0.0, 1.0)?;
+        config_in("longitudinal.jerk_m_s3", self.jerk_m_s3, 0.1, 100.0)
     }
 }
 
@@ -91,6 +101,9 @@ pub(crate) struct SpeedTarget {
     pub accel_m_s2: f64,
     /// Acceleration not to be exceeded because of traffic, m/s²; infinite without traffic.
     pub traffic_accel_m_s2: f64,
+    /// Factor on the comfortable jerk with which traffic is answered, from 1; infinite in an
+    /// emergency.
+    pub haste: f64,
     /// Grade at the truck, rad, mean over its length.
     pub grade_rad: f64,
     /// Speed, m/s, and acceleration, m/s², from which on the truck brakes; up to there it rolls
@@ -133,6 +146,8 @@ pub(crate) struct LongitudinalController {
     service_brake: bool,
     pedal_frac: f64,
     coasting: bool,
+    /// The wanted acceleration of the last step, m/s².
+    accel_m_s2: Option<f64>,
 }
 
 impl LongitudinalController {
@@ -147,6 +162,7 @@ impl LongitudinalController {
             service_brake: false,
             pedal_frac: 0.0,
             coasting: false,
+            accel_m_s2: None,
         }
     }
 
@@ -172,8 +188,9 @@ impl LongitudinalController {
             asked.max(braked.min((coast - resistance) / mass))
         });
         let cruise = wanted.clamp(-c.decel_max_m_s2, c.accel_max_m_s2);
-        let accel = cruise.min(target.traffic_accel_m_s2);
-        let traffic_rules = accel < cruise;
+        let asked = cruise.min(target.traffic_accel_m_s2);
+        let traffic_rules = asked < cruise;
+        let accel = self.smoothed(dt_s, asked, c.jerk_m_s3 * target.haste.max(1.0));
         self.coasting = target.coast && self.may_coast(error, target, ego.accel_x_m_s2);
         if self.coasting {
             return self.roll(dt_s, accel);
@@ -205,6 +222,7 @@ impl LongitudinalController {
             self.integral_m_s2 = (self.integral_m_s2 + slope * dt_s)
                 .clamp(-c.integral_limit_m_s2, c.integral_limit_m_s2);
         }
+        let xbr = self.hold(ego, target, limits, accel).map_or(xbr, |hold| xbr.max(hold));
         SpeedCommand {
             accelerator_pedal_frac: self.pedal_frac,
             retarder_frac,
@@ -213,6 +231,35 @@ impl LongitudinalController {
             accel_m_s2: accel,
             traffic_rules,
         }
+    }
+
+    /// The wanted acceleration after a step in which it may change with this jerk, m/s².
+    fn smoothed(&mut self, dt_s: f64, asked_m_s2: f64, jerk_m_s3: f64) -> f64 {
+        let step = jerk_m_s3 * dt_s;
+        let from = self.accel_m_s2.unwrap_or(asked_m_s2);
+        let accel = asked_m_s2.clamp(from - step, from + step);
+        self.accel_m_s2 = Some(accel);
+        accel
+    }
+
+    /// Brake that holds a standing truck, m/s²: while it is to stand, and uphill until the clutch
+    /// carries it.
+    fn hold(
+        &mut self,
+        ego: &EgoState,
+        target: &SpeedTarget,
+        limits: &VehicleLimits,
+        accel_m_s2: f64,
+    ) -> Option<f64> {
+        let slope_n = resistance_n(&limits.road_load, 0.0, target.grade_rad);
+        let stands = ego.speed_m_s.abs() < STANDS_M_S;
+        let to_stand = accel_m_s2 <= 0.0;
+        if to_stand && stands {
+            self.pedal_frac = 0.0;
+        }
+        let sinks = target.grade_rad > 0.0 && ego.powertrain.drive_force_n < slope_n;
+        let hold = stands && (to_stand || sinks);
+        hold.then(|| HOLD_M_S2 + GRAVITY_M_S2 * libm::sin(target.grade_rad.abs()))
     }
 
     /// Whether the truck may roll on: near enough to the reference, a little too fast less than too
@@ -226,6 +273,7 @@ impl LongitudinalController {
 
     /// Neither pedal nor brake; the integrator rests.
     fn roll(&mut self, dt_s: f64, accel_m_s2: f64) -> SpeedCommand {
+        self.accel_m_s2 = Some(accel_m_s2);
         self.in_actuator_s += dt_s;
         self.actuator = Actuator::Drive;
         self.service_brake = false;

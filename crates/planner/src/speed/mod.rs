@@ -6,6 +6,7 @@
 //! | `profile` | a speed profile planned ahead of time |
 //! | `leads` | the vehicles that bound the truck's speed |
 //! | `following` | acceleration behind each of them |
+//! | `stop_and_go` | in a jam: the jam's mean speed, a gap that breathes, stops and starts |
 //! | `road_load` | inverse powertrain: acceleration to force to pedal |
 //! | `longitudinal` | the controller: pedal, retarder, brakes |
 //! | `estimator` | mass and rolling resistance from driving |
@@ -17,13 +18,15 @@ mod longitudinal;
 mod profile;
 mod reference;
 mod road_load;
+mod stop_and_go;
 
 pub(crate) use estimator::LoadEstimator;
 pub use estimator::{EstimatorConfig, LoadEstimate};
 pub use following::FollowingConfig;
-pub(crate) use following::{Following, follow, steady_gap_m};
+pub(crate) use following::{Following, Lead, follow, steady_gap_m};
 pub(crate) use leads::{LeadView, leads};
 pub use longitudinal::LongitudinalConfig;
 pub(crate) use longitudinal::{LongitudinalController, SpeedTarget};
 pub use profile::SpeedProfile;
 pub(crate) use reference::{ReferenceSpeed, SpeedBounds};
+pub(crate) use stop_and_go::StopAndGo;

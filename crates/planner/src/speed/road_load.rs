@@ -24,6 +24,8 @@ pub(super) struct InGear<'a> {
     pub engine_speed_rad_s: f64,
     /// Rotating inertia felt as mass, kg.
     pub rotating_mass_kg: f64,
+    /// The clutch can be closed: the gear turns the engine at idle speed or above.
+    closed: bool,
     /// Largest force of a retarder behind the gearbox at the wheels, N, positive.
     retarder_n: f64,
 }
@@ -45,13 +47,16 @@ impl<'a> InGear<'a> {
                 .unwrap_or(0)
         };
         let leverage_1_m = per_speed * ratio(index);
+        let closed = speed_m_s * leverage_1_m >= powertrain.idle_speed_rad_s;
+        let rotating = powertrain.rotating_mass_kg.get(index).copied().unwrap_or(0.0);
         Self {
             powertrain,
             leverage_1_m,
             efficiency_frac: powertrain.gear_efficiency_frac.get(index).copied().unwrap_or(1.0),
             engine_speed_rad_s: (speed_m_s * leverage_1_m)
                 .clamp(powertrain.idle_speed_rad_s, powertrain.max_speed_rad_s),
-            rotating_mass_kg: powertrain.rotating_mass_kg.get(index).copied().unwrap_or(0.0),
+            rotating_mass_kg: if closed { rotating } else { powertrain.rotating_mass_neutral_kg },
+            closed,
             retarder_n: powertrain.retarder_force_n.as_ref().map_or(0.0, |f| f.at(speed_m_s)),
         }
     }
@@ -77,10 +82,10 @@ impl<'a> InGear<'a> {
         if force_n >= 0.0 { torque / self.efficiency_frac } else { torque * self.efficiency_frac }
     }
 
-    /// Wheel force without fuel, N (negative).
+    /// Wheel force without fuel, N (negative); none where the clutch is open.
     #[must_use]
     pub(super) fn coast_force_n(&self) -> f64 {
-        self.force_n(-self.loss_nm())
+        if self.closed { self.force_n(-self.loss_nm()) } else { 0.0 }
     }
 
     /// Largest wheel force, N.

@@ -10,7 +10,10 @@ use crate::decider::{
     observation, rules,
 };
 use crate::pcc::horizon::LeadAhead;
-use crate::speed::{Following, LeadView, SpeedBounds, SpeedTarget, follow, leads, steady_gap_m};
+use crate::safety::RearResponse;
+use crate::speed::{
+    Following, Lead, LeadView, SpeedBounds, SpeedTarget, follow, leads, steady_gap_m,
+};
 use crate::steering::{
     LOWEST_SPEED_M_S, Lateral, LateralPath, ManeuverPlanner, PREVIEW_POINTS, PREVIEW_STEP_S,
     PathError, Situation,
@@ -75,7 +78,10 @@ impl Stack {
         self.plan.lane = maneuver.lane();
         let command = if due(rates.control_ticks) {
             let view = LeadView { ego, scene, road, limits, rss: &self.config.rss };
-            let following = self.follow(&view, &maneuver, grade_rad);
+            let leads = leads(&view, &maneuver);
+            let response = self.config.rss.ego_response(limits);
+            let following = self.follow(&leads, &response, ego.speed_m_s, grade_rad);
+            let jam_accel_m_s2 = self.stop_and_go(&leads, &response, ego.speed_m_s);
             let planned = maneuver.planned_speed(now).filter(|p| p.0 < reference_m_s);
             let (speed_m_s, accel_m_s2) = planned.unwrap_or((reference_m_s, reference_accel));
             self.plan.following = following.map(|(id, _)| id);
@@ -85,11 +91,15 @@ impl Stack {
                 free: planned.is_none(),
                 braking: self.guard.sent().retarder_frac > 0.3
                     || self.guard.sent().xbr_decel_m_s2 > 0.0,
+                pedal_frac: self.guard.sent().accelerator_pedal_frac,
             };
             let target = SpeedTarget {
                 speed_m_s,
                 accel_m_s2,
-                traffic_accel_m_s2: following.map_or(f64::INFINITY, |(_, f)| f.accel_m_s2),
+                traffic_accel_m_s2: following
+                    .map_or(f64::INFINITY, |(_, f)| f.accel_m_s2)
+                    .min(jam_accel_m_s2),
+                haste: following.map_or(1.0, |(_, f)| f.haste),
                 grade_rad,
                 brake_from: self.may_overspeed().then(|| self.ceiling.at(ego.s_m)).flatten(),
                 coast: self.plans_ahead() && self.speed.coasts(ego.s_m, &doing),
@@ -319,21 +329,38 @@ impl Stack {
         (error, self.lateral.step(ego, error, &curvature, limits))
     }
 
+    /// What a jam asks for, by the nearest vehicle in the path.
+    fn stop_and_go(
+        &mut self,
+        leads: &[Option<Lead>; 2],
+        response: &RearResponse,
+        speed_m_s: f64,
+    ) -> f64 {
+        let config = &self.config.following;
+        let lead = leads
+            .iter()
+            .flatten()
+            .filter(|lead| lead.in_path && !lead.being_left)
+            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
+        let steady_gap = |speed_m_s: f64| {
+            lead.map_or(0.0, |lead| steady_gap_m(config, response, &Lead { speed_m_s, ..*lead }))
+        };
+        self.jam.step(self.config.rates.control_s(), config, speed_m_s, lead, steady_gap)
+    }
+
     /// The strictest request of car following, and whom it follows.
     fn follow(
         &self,
-        view: &LeadView<'_>,
-        maneuver: &ManeuverPlanner,
+        leads: &[Option<Lead>; 2],
+        response: &RearResponse,
+        speed_m_s: f64,
         grade_rad: f64,
     ) -> Option<(u64, Following)> {
-        let response = self.config.rss.ego_response(view.limits);
-        leads(view, maneuver)
-            .into_iter()
+        let config = &self.config.following;
+        leads
+            .iter()
             .flatten()
-            .map(|lead| {
-                let v = view.ego.speed_m_s;
-                (lead.id, follow(&self.config.following, &response, v, grade_rad, &lead))
-            })
+            .map(|lead| (lead.id, follow(config, response, speed_m_s, grade_rad, lead)))
             .min_by(|a, b| a.1.accel_m_s2.total_cmp(&b.1.accel_m_s2))
     }
 }

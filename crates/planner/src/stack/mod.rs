@@ -20,7 +20,7 @@ use crate::decider::{DeciderKind, LaneChoice, Policy};
 use crate::pcc::horizon::{HorizonFailure, HorizonPlan};
 use crate::safety::{GuardInput, GuardMemory, Headway, inspect, limit};
 use crate::speed::{
-    LeadView, LoadEstimate, LoadEstimator, LongitudinalController, ReferenceSpeed, leads,
+    LeadView, LoadEstimate, LoadEstimator, LongitudinalController, ReferenceSpeed, StopAndGo, leads,
 };
 use crate::steering::{LateralController, ManeuverPlanner};
 use crate::{PlannerError, SpeedProfile};
@@ -34,6 +34,7 @@ pub struct Stack {
     config: StackConfig,
     lateral: LateralController,
     longitudinal: LongitudinalController,
+    jam: StopAndGo,
     reference: ReferenceSpeed,
     /// Up to this speed cruise control rolls before it brakes.
     ceiling: ReferenceSpeed,
@@ -90,6 +91,7 @@ impl Stack {
         Ok(Self {
             lateral: LateralController::new(config.lateral, limits, rates.control_s())?,
             longitudinal: LongitudinalController::new(config.longitudinal),
+            jam: StopAndGo::default(),
             reference: ReferenceSpeed::default(),
             ceiling: ReferenceSpeed::default(),
             guard: GuardMemory::default(),

@@ -29,6 +29,9 @@ const RUNAWAY_M_S: f64 = 0.5;
 /// A requested gear is kept for this long, s.
 const GEAR_HOLD_S: f64 = 4.0;
 
+/// Above this pedal a gear below the lugging limit is not asked for.
+const LUGGING_PEDAL_FRAC: f64 = 0.75;
+
 /// What the road ahead, the truck and traffic are when a plan is asked for.
 pub(super) struct Ahead<'a> {
     pub(super) now: Time,
@@ -44,6 +47,7 @@ pub(super) struct Doing {
     pub(super) reference_m_s: f64,
     pub(super) free: bool,
     pub(super) braking: bool,
+    pub(super) pedal_frac: f64,
 }
 
 /// Plans and their use.
@@ -218,6 +222,11 @@ impl SpeedPlanning {
                 self.asking = doing.free && over.abs() < room;
                 match soon.drive {
                     _ if !self.asking => GearRequest::Automatic,
+                    Drive::Gear(g)
+                        if doing.pedal_frac > LUGGING_PEDAL_FRAC && lugs(g, ego, limits) =>
+                    {
+                        GearRequest::Automatic
+                    }
                     Drive::Gear(g) => GearRequest::Gear(g + 1),
                     Drive::Neutral if over < RUNAWAY_M_S && soon.coast => GearRequest::Neutral,
                     Drive::Neutral => GearRequest::Automatic,
@@ -238,4 +247,11 @@ impl SpeedPlanning {
         }
         self.gear
     }
+}
+
+/// Whether a gear, as an index, turns the engine below its lugging limit.
+fn lugs(gear: u8, ego: &EgoState, limits: &VehicleLimits) -> bool {
+    let p = &limits.powertrain;
+    let ratio = p.gear_ratios.get(usize::from(gear)).copied().unwrap_or(0.0);
+    ego.speed_m_s * ratio * p.final_drive_ratio / p.wheel_radius_m < p.lugging_speed_rad_s
 }

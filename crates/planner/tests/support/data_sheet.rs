@@ -81,6 +81,7 @@ pub fn reference_limits() -> VehicleLimits {
             auxiliary_power_w: 4000.0,
             idle_speed_rad_s: 600.0 / RPM_PER_RAD_S,
             max_speed_rad_s: 2100.0 / RPM_PER_RAD_S,
+            lugging_speed_rad_s: 750.0 / RPM_PER_RAD_S,
             fuel: FuelModel::Willans {
                 constant_g_s: 0.05,
                 per_rpm_g_s: 0.000_12,

@@ -23,10 +23,6 @@ use tractrix_core::{FuelModel, GRAVITY_M_S2, VehicleLimits};
 use super::engine::TorqueCurves;
 use crate::pcc::error::PccError;
 
-/// Lowest engine speed under load, as a multiple of idle speed. Automated gearboxes shift down
-/// before; 1.25 × 600 rpm = 750 rpm is 52 km/h in a direct top gear.
-const LUGGING_FACTOR: f64 = 1.25;
-
 /// A forward gear, as an index from 0, or open driveline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Drive {
@@ -90,7 +86,7 @@ impl Truck {
             inertia_factor_neutral: inertia(p.rotating_mass_neutral_kg),
             torque_nm: TorqueCurves::new(&p.full_load_nm, &p.friction_nm),
             auxiliary_power_w: p.auxiliary_power_w,
-            min_speed_rad_s: p.idle_speed_rad_s * LUGGING_FACTOR,
+            min_speed_rad_s: p.lugging_speed_rad_s,
             max_speed_rad_s: p.max_speed_rad_s,
             fuel: p.fuel.clone(),
             idle_fuel_g_s: p.idle_fuel_g_s,

@@ -22,8 +22,6 @@ use tractrix_core::{FuelModel, GRAVITY_M_S2, PowertrainLimits, VehicleLimits};
 const SLOW_PRICE: f64 = 60.0;
 /// Step of the truck's tables in energy, J/kg.
 const TABLE_STEP: f64 = 0.25;
-/// Full load or lowest engine speed under load: 1.25 times idle.
-const LUGGING: f64 = 1.25;
 
 /// The statement of a problem.
 pub(crate) struct Task<'a> {
@@ -141,7 +139,7 @@ pub(crate) struct Plant<'a> {
 }
 
 fn figures(p: &PowertrainLimits, mass: f64, i: f64, eta: f64, v: f64) -> At {
-    let w = (v * i).max(LUGGING * p.idle_speed_rad_s);
+    let w = (v * i).max(p.lugging_speed_rad_s);
     let friction_nm = p.friction_nm.at(w);
     let lost = (friction_nm + p.auxiliary_power_w / w) * i / eta;
     let net = (p.full_load_nm.at(w) - p.auxiliary_power_w / w).max(0.0);
@@ -154,7 +152,7 @@ impl<'a> Plant<'a> {
         let mass = task.limits.road_load.mass_kg;
         let top = task.e_max.iter().copied().fold(0.0, f64::max);
         let bottom = task.e_min.iter().copied().fold(f64::MAX, f64::min);
-        let slowest_w = LUGGING * p.idle_speed_rad_s;
+        let slowest_w = p.lugging_speed_rad_s;
         let rows = (top / TABLE_STEP) as usize + 3;
         let rolling = task.may_roll.is_some().then(|| Gear {
             index: NEUTRAL,
