@@ -20,6 +20,7 @@ mod limits;
 mod limits_check;
 mod plan;
 mod provenance;
+pub mod road_load;
 mod scene;
 mod seams;
 mod table;
@@ -31,12 +32,13 @@ pub use command::{BrakeMode, Command, GearRequest};
 pub use ego::{EgoState, PowertrainSignals, TrailerState};
 pub use error::CoreError;
 pub use fuel::{FuelModel, LowLoadFuel, RPM_PER_RAD_S};
-pub use limits::{BrakeLimits, Geometry, LateralLimits, PowertrainLimits, RoadLoad, VehicleLimits};
+pub use limits::{BrakeLimits, Geometry, LateralLimits, PowertrainLimits, VehicleLimits};
 pub use plan::{
     GuardReason, LaneChangeReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus,
     SpeedPoint,
 };
 pub use provenance::Provenance;
+pub use road_load::{RoadLoad, RoadPiece, Wind};
 pub use scene::{Neighbour, Scene, VehicleClass};
 pub use seams::{Recorder, Stamped, Tick, TrafficSource, Vehicle};
 pub use table::{Curve, Grid};

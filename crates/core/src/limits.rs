@@ -6,7 +6,7 @@
 use alloc::vec::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::{Curve, FuelModel, Grid};
+use crate::{Curve, FuelModel, Grid, RoadLoad};
 
 /// Lengths of the combination. "Ahead" and "behind" refer to the reference point: the centre of
 /// the tractor's drive-axle group, on the ground.
@@ -71,7 +71,7 @@ pub struct PowertrainLimits {
     /// positive; it adds to the engine brake. `None`: there is no such retarder.
     #[serde(default)]
     pub retarder_force_n: Option<Curve>,
-    /// Auxiliary power at the crank, W.
+    /// Auxiliary power at the crank, W, with the mean of a fan that runs by temperature.
     pub auxiliary_power_w: f64,
     /// Idle speed, rad/s.
     pub idle_speed_rad_s: f64,
@@ -90,19 +90,6 @@ pub struct PowertrainLimits {
     pub pedal_map_nm: Option<Grid>,
     /// Density of the fuel, kg/m³.
     pub fuel_density_kg_m3: f64,
-}
-
-/// Forces that resist motion on a straight road.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct RoadLoad {
-    /// Total mass, kg (estimate on a real truck).
-    pub mass_kg: f64,
-    /// Drag area, m².
-    pub cd_a_m2: f64,
-    /// Air density, kg/m³.
-    pub air_density_kg_m3: f64,
-    /// Rolling resistance coefficient, dimensionless.
-    pub rolling_coeff: f64,
 }
 
 /// Brakes as a planner needs them.

@@ -2,12 +2,15 @@
 
 use tractrix_core::{
     BrakeLimits, Curve, EgoState, GRAVITY_M_S2, Geometry, PowertrainLimits, PowertrainSignals,
-    RPM_PER_RAD_S, RoadLoad, TrailerState, VehicleLimits,
+    RPM_PER_RAD_S, RoadLoad, RoadPiece, TrailerState, VehicleLimits, Wind,
 };
 
 use crate::effects::resistance::air_density_kg_m3;
 use crate::effects::shift::ShiftPhase;
 use crate::{DynamicsError, RoadPatch, TruckModel, TruckState};
+
+/// Speed at which the mean power of the fan is told, m/s: 80 km/h.
+const CRUISE_M_S: f64 = 80.0 / 3.6;
 
 /// The paper's 16 outputs of the truck model (Table I and the released interface), in SI.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -147,11 +150,19 @@ impl TruckModel {
         }
     }
 
-    /// What a planner may know about this truck at its present load, in standard air.
+    /// What a planner may know about this truck at its present load, in standard air without wind.
     ///
     /// # Errors
     /// [`DynamicsError::OutOfBounds`] if a table cannot be built.
     pub fn vehicle_limits(&self) -> Result<VehicleLimits, DynamicsError> {
+        self.vehicle_limits_in(&RoadPatch::default())
+    }
+
+    /// The same in the air and the wind of a patch of road.
+    ///
+    /// # Errors
+    /// [`DynamicsError::OutOfBounds`] if a table cannot be built.
+    pub fn vehicle_limits_in(&self, patch: &RoadPatch) -> Result<VehicleLimits, DynamicsError> {
         let (p, e, d) = (&self.parameters, &self.parameters.engine, &self.parameters.driveline);
         let gears = d.gear_ratios.len() as u8;
         let speeds: Vec<f64> = (0..=30)
@@ -188,7 +199,7 @@ impl TruckModel {
                 friction_nm: tabulate("friction", &|n| self.engine.friction_nm(n))?,
                 engine_brake_nm: tabulate("engine brake", &|n| self.engine.engine_brake_nm(n))?,
                 retarder_force_n: (d.retarder_torque_nm > 0.0).then_some(retarder_n),
-                auxiliary_power_w: e.auxiliary_power_w,
+                auxiliary_power_w: e.auxiliary_power_w + self.cruising_fan_w(patch),
                 idle_speed_rad_s: idle,
                 max_speed_rad_s: self.engine.max_rad_s,
                 lugging_speed_rad_s: p.shift.lugging_rpm() / RPM_PER_RAD_S,
@@ -199,12 +210,7 @@ impl TruckModel {
                 pedal_map_nm: self.engine.pedal_map_nm.clone(),
                 fuel_density_kg_m3: e.fuel.density_kg_m3,
             },
-            road_load: RoadLoad {
-                mass_kg: self.mass_kg,
-                cd_a_m2: p.resistance.drag_area_m2,
-                air_density_kg_m3: air_density_kg_m3(101_325.0, 288.15),
-                rolling_coeff: p.resistance.rolling_coeff,
-            },
+            road_load: self.road_load_in(patch),
             brakes: BrakeLimits {
                 max_decel_m_s2: (p.brake.gain_n_pa * p.brake.max_pressure_pa / self.mass_kg)
                     .min(0.65 * GRAVITY_M_S2),
@@ -213,5 +219,41 @@ impl TruckModel {
             },
             lateral: self.lateral.limits(),
         })
+    }
+
+    /// Forces that resist the motion of this truck with warm tyres, in the air and the wind of a
+    /// patch of road.
+    #[must_use]
+    pub fn road_load_in(&self, patch: &RoadPatch) -> RoadLoad {
+        let r = &self.parameters.resistance;
+        let stiffness: f64 = self.lateral.yaw_sideslip().stiffness_n_rad.iter().sum();
+        RoadLoad {
+            mass_kg: self.mass_kg,
+            cd_a_m2: r.drag_area_m2,
+            air_density_kg_m3: air_density_kg_m3(patch.air_pressure_pa, patch.air_temperature_k),
+            rolling_coeff: r.rolling_coeff,
+            rolling_per_speed_s_m: r.rolling_per_speed_s_m,
+            constant_drag_n: r.parasitic_force_n,
+            curve_drag_1_n: r.curve_drag_1_n(stiffness),
+            drag_yaw_1_rad: r.drag_yaw_1_rad,
+            wind: Wind {
+                to_x_m_s: patch.wind_m_s.0 + r.wind_to_x_m_s,
+                to_y_m_s: patch.wind_m_s.1 + r.wind_to_y_m_s,
+                against_m_s: r.headwind_m_s,
+                to_left_m_s: r.crosswind_to_left_m_s,
+            },
+        }
+    }
+
+    /// Mean power of the fan while the truck cruises on a level road, W.
+    fn cruising_fan_w(&self, patch: &RoadPatch) -> f64 {
+        let (e, d) = (&self.parameters.engine, &self.parameters.driveline);
+        let level = RoadPiece { cos_grade: 1.0, ..RoadPiece::default() };
+        let force_n = self.road_load_in(patch).resistance_n(CRUISE_M_S, &level);
+        let speed_rad_s = d.engine_speed_rad_s(CRUISE_M_S, d.gear_ratios.len() as u8);
+        let indicated_w = force_n * CRUISE_M_S / d.efficiency_frac()
+            + self.engine.friction_nm(speed_rad_s) * speed_rad_s
+            + e.auxiliary_power_w;
+        self.mean_fan_w(indicated_w, patch.air_temperature_k)
     }
 }

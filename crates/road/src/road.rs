@@ -46,6 +46,8 @@ pub struct ProfilePoint {
     pub curvature_1_m: f64,
     /// Bank, rad.
     pub bank_rad: f64,
+    /// Heading of the road, rad, map frame.
+    pub heading_rad: f64,
     /// Speed limit, m/s.
     pub speed_limit_m_s: f64,
 }
@@ -295,6 +297,7 @@ impl Road {
                 grade_rad: small::atan(k.slope),
                 curvature_1_m: k.curvature_1_m,
                 bank_rad: k.bank_rad,
+                heading_rad: k.heading_rad,
                 speed_limit_m_s: self.speed_limit_m_s(k.s_m),
             };
         }

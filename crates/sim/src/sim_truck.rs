@@ -43,7 +43,12 @@ impl SimTruck {
         weather: &Weather,
     ) -> Result<Self, SimError> {
         let refuse = |why: String| SimError::Scenario { name: "ego".into(), why };
-        let limits = model.vehicle_limits()?;
+        let limits = model.vehicle_limits_in(&RoadPatch {
+            wind_m_s: (weather.wind_x_m_s, weather.wind_y_m_s),
+            air_temperature_k: weather.air_temperature_k,
+            air_pressure_pa: weather.air_pressure_pa,
+            ..RoadPatch::default()
+        })?;
         let needs_m = limits.geometry.rear_m();
         if start.s_m < needs_m || start.s_m + limits.geometry.front_m >= road.length_m() {
             return Err(refuse(format!(

@@ -10,6 +10,8 @@
 //! Sources: VECTO air drag model (yaw dependence), ISO 28580 (rolling), Hyttinen 2022 (warm-up).
 
 use serde::{Deserialize, Serialize};
+use tractrix_core::road_load::{air_drag_n, air_yaw_rad};
+pub use tractrix_core::road_load::{area_at_yaw_m2, drag_n, on_course};
 use tractrix_core::{GAS_CONSTANT_AIR_J_KG_K, GRAVITY_M_S2};
 
 use crate::bounds::Bounds;
@@ -101,7 +103,7 @@ impl AirFlow {
     }
 
     fn yaw_rad(&self) -> f64 {
-        if self.cross_m_s == 0.0 { 0.0 } else { libm::atan2(self.cross_m_s, self.head_m_s.abs()) }
+        air_yaw_rad(self.head_m_s, self.cross_m_s)
     }
 
     fn squared(&self) -> f64 {
@@ -127,29 +129,6 @@ pub fn air_above((temperature_k, pressure_pa): (f64, f64), climbed_m: f64) -> (f
     let ratio = (1.0 - TEMPERATURE_LAPSE_K_M * climbed_m / temperature_k).max(LEAST_RATIO);
     let exponent = GRAVITY_M_S2 / (GAS_CONSTANT_AIR_J_KG_K * TEMPERATURE_LAPSE_K_M);
     (temperature_k * ratio, pressure_pa * libm::pow(ratio, exponent))
-}
-
-/// Components of a wind (map frame, blowing towards) along and to the left of a course, m/s, from
-/// the course's sine and cosine.
-#[inline]
-#[must_use]
-pub fn on_course(wind_m_s: (f64, f64), (sin, cos): (f64, f64)) -> (f64, f64) {
-    (wind_m_s.0 * cos + wind_m_s.1 * sin, wind_m_s.1 * cos - wind_m_s.0 * sin)
-}
-
-/// Drag area at an air yaw, m²; `yaw_rad` is its magnitude.
-#[inline]
-#[must_use]
-pub fn area_at_yaw_m2(area_m2: f64, growth_1_rad: f64, yaw_rad: f64) -> f64 {
-    area_m2 * (1.0 + growth_1_rad * yaw_rad)
-}
-
-/// Air drag, N, of a flow whose speed squared is `flow_m2_s2`; `head` is the cosine of its
-/// direction, 1 from ahead.
-#[inline]
-#[must_use]
-pub fn drag_n(density_kg_m3: f64, area_m2: f64, flow_m2_s2: f64, head: f64) -> f64 {
-    0.5 * density_kg_m3 * area_m2 * flow_m2_s2 * head
 }
 
 /// Side force of the air, N, positive to the left.
@@ -221,17 +200,20 @@ impl ResistanceParameters {
     #[must_use]
     pub fn curve_n(&self, mass_kg: f64, lateral_m_s2: f64, stiffness_n_rad: f64) -> f64 {
         let side_n = mass_kg * lateral_m_s2;
-        self.curve_drag_coeff * side_n * side_n / stiffness_n_rad.max(1.0)
+        self.curve_drag_1_n(stiffness_n_rad) * side_n * side_n
+    }
+
+    /// Induced drag per side force squared, 1/N.
+    #[must_use]
+    pub fn curve_drag_1_n(&self, stiffness_n_rad: f64) -> f64 {
+        self.curve_drag_coeff / stiffness_n_rad.max(1.0)
     }
 
     /// Air drag, N; positive against forward motion.
     #[must_use]
     pub fn drag_n(&self, air: &AirFlow) -> f64 {
-        let beta = air.yaw_rad();
-        let cos_beta = if beta == 0.0 { 1.0 } else { libm::cos(beta) };
-        let area = area_at_yaw_m2(self.drag_area_m2, self.drag_yaw_1_rad, beta.abs());
-        let head = if air.head_m_s < 0.0 { -cos_beta } else { cos_beta };
-        drag_n(air.density_kg_m3, area, air.squared(), head)
+        let flow = (air.head_m_s, air.cross_m_s);
+        air_drag_n(air.density_kg_m3, self.drag_area_m2, self.drag_yaw_1_rad, flow)
     }
 
     /// Side forces of the wind on (tractor, trailer), N, positive to the left.

@@ -222,21 +222,50 @@ impl TruckModel {
         let r = &self.parameters.resistance;
         let rolling = if s.speed_m_s.abs() > 1.0 { 1.0 } else { 0.0 };
         s.tyre_warmth += (rolling - s.tyre_warmth) * SUBSTEP_S / r.tyre_warmup_s;
-        let indicated_w = s.engine_torque_nm * s.engine_speed_rad_s;
-        s.fan_runs = self.engine.fan_runs(s.fan_runs, s.coolant_k);
-        let Some(cooling) = &self.parameters.cooling else {
-            let fan = if s.fan_runs { 12.0 } else { 0.0 };
-            let level = patch.air_temperature_k + COOLANT.2 + COOLANT.1 * indicated_w - fan;
-            s.coolant_k += (level.max(350.0) - s.coolant_k) * SUBSTEP_S / COOLANT.0;
-            return;
-        };
         let from = HeatSources {
-            indicated_w,
+            indicated_w: s.engine_torque_nm * s.engine_speed_rad_s,
             engine_brake_w: s.engine_brake_nm * s.engine_speed_rad_s,
             retarder_w: s.forces.retarder_heat_n * s.speed_m_s.abs(),
         };
         let air_k = patch.air_temperature_k;
-        s.coolant_k = cooling.step_k(s.coolant_k, s.fan_runs, &from, air_k, SUBSTEP_S);
+        s.fan_runs = self.engine.fan_runs(s.fan_runs, s.coolant_k);
+        s.coolant_k = self.coolant_step_k(s.coolant_k, s.fan_runs, &from, air_k, SUBSTEP_S);
+    }
+
+    /// Coolant temperature after `dt_s`, K.
+    fn coolant_step_k(
+        &self,
+        coolant_k: f64,
+        fan_runs: bool,
+        from: &HeatSources,
+        air_k: f64,
+        dt_s: f64,
+    ) -> f64 {
+        if let Some(cooling) = &self.parameters.cooling {
+            return cooling.step_k(coolant_k, fan_runs, from, air_k, dt_s);
+        }
+        let fan = if fan_runs { 12.0 } else { 0.0 };
+        let level = air_k + COOLANT.2 + COOLANT.1 * from.indicated_w - fan;
+        coolant_k + (level.max(350.0) - coolant_k) * dt_s / COOLANT.0
+    }
+
+    /// Mean power of the fan, W, in the second of two hours in which the engine, the fan not
+    /// counted, gives `indicated_w` in air of `air_k`.
+    pub(crate) fn mean_fan_w(&self, indicated_w: f64, air_k: f64) -> f64 {
+        let fan_w = self.engine.parameters.fan_power_w;
+        if fan_w == 0.0 {
+            return 0.0;
+        }
+        let (mut coolant_k, mut runs, mut count) = (air_k + COOLANT.2, false, 0_u32);
+        const HOUR_S: u32 = 3_600;
+        for second in 0..2 * HOUR_S {
+            runs = self.engine.fan_runs(runs, coolant_k);
+            let indicated_w = indicated_w + if runs { fan_w } else { 0.0 };
+            let from = HeatSources { indicated_w, ..HeatSources::default() };
+            coolant_k = self.coolant_step_k(coolant_k, runs, &from, air_k, 1.0);
+            count += u32::from(second >= HOUR_S && runs);
+        }
+        fan_w * f64::from(count) / f64::from(HOUR_S)
     }
 
     /// The road under the truck where the map says `patch`.

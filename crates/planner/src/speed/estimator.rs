@@ -6,7 +6,7 @@
 //! between; both are valid only once their variance is small. Shifts, service braking, low speed and
 //! steering are left out.
 
-use super::road_load::InGear;
+use super::road_load::{InGear, road_under};
 use crate::PlannerError;
 use crate::error::config_in;
 use serde::{Deserialize, Serialize};
@@ -117,11 +117,15 @@ impl LoadEstimator {
         }
         let in_gear = InGear::new(&limits.powertrain, signals.gear, ego.speed_m_s);
         let v = ego.speed_m_s;
-        let air = 0.5 * self.declared.air_density_kg_m3 * self.declared.cd_a_m2 * v * v;
+        let known = &self.declared;
+        let road = road_under(known, ego, grade_rad);
+        // what does not grow with the mass, and the declared growth of the rolling resistance
+        let growth = known.rolling_per_speed_s_m * v * road.cos_grade;
+        let bound = known.bound_n(v, &road) + known.mass_kg * GRAVITY_M_S2 * growth;
         let force = signals.drive_force_n
             - signals.retarder_force_n
             - in_gear.rotating_mass_kg * ego.accel_x_m_s2
-            - air;
+            - bound;
         let phi = [
             ego.accel_x_m_s2 + GRAVITY_M_S2 * libm::sin(grade_rad),
             GRAVITY_M_S2 * libm::cos(grade_rad),
@@ -165,7 +169,6 @@ impl LoadEstimator {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::speed::road_load::resistance_n;
     use crate::testing::reference_limits;
     use tractrix_core::PowertrainSignals;
 
@@ -178,8 +181,9 @@ mod tests {
             let grade_rad = hills * libm::sin(t / 40.0);
             let accel = 5.0 * hills * libm::sin(t / 15.0);
             let gear = InGear::new(&limits.powertrain, 12, 20.0);
-            let force = resistance_n(&actual, 20.0, grade_rad)
-                + (actual_kg + gear.rotating_mass_kg) * accel;
+            let road = road_under(&actual, &EgoState::default(), grade_rad);
+            let force =
+                actual.resistance_n(20.0, &road) + (actual_kg + gear.rotating_mass_kg) * accel;
             let ego = EgoState {
                 speed_m_s: 20.0,
                 accel_x_m_s2: accel,

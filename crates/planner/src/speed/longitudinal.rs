@@ -10,7 +10,7 @@
 //! traffic allows, the comfortable one by default. At standstill the brakes hold the truck until the
 //! clutch carries it.
 
-use super::road_load::{InGear, effective_mass_kg, resistance_n};
+use super::road_load::{InGear, effective_mass_kg, road_under};
 use crate::PlannerError;
 use crate::error::config_in;
 use serde::{Deserialize, Serialize};
@@ -180,7 +180,9 @@ impl LongitudinalController {
         let in_gear = InGear::new(&limits.powertrain, signals.gear, ego.speed_m_s);
         let error = target.speed_m_s - ego.speed_m_s;
         let mass = effective_mass_kg(limits, &in_gear);
-        let resistance = resistance_n(&limits.road_load, ego.speed_m_s, target.grade_rad);
+        let load = &limits.road_load;
+        let road = road_under(load, ego, target.grade_rad);
+        let resistance = load.resistance_n(ego.speed_m_s, &road);
         let coast = in_gear.coast_force_n();
         let asked = target.accel_m_s2 + c.gain_1_s * error + self.integral_m_s2;
         let wanted = target.brake_from.map_or(asked, |(speed_m_s, accel_m_s2)| {

@@ -3,14 +3,21 @@
 //!
 //! Left out: torque build-up, shifting and temperature; the speed controller's feedback covers them.
 
-use tractrix_core::{GRAVITY_M_S2, PowertrainLimits, RoadLoad, VehicleLimits};
+use tractrix_core::{EgoState, PowertrainLimits, RoadLoad, RoadPiece, VehicleLimits};
 
-/// Force that resists motion, N: grade, rolling and air at `speed_m_s` (no wind), grade in rad.
+/// The road under the truck as its load sees it, from where the truck drives and what it feels.
 #[must_use]
-pub(super) fn resistance_n(load: &RoadLoad, speed_m_s: f64, grade_rad: f64) -> f64 {
-    let weight_n = load.mass_kg * GRAVITY_M_S2;
-    let air_n = 0.5 * load.air_density_kg_m3 * load.cd_a_m2 * speed_m_s * speed_m_s.abs();
-    weight_n * (libm::sin(grade_rad) + load.rolling_coeff * libm::cos(grade_rad)) + air_n
+pub(super) fn road_under(load: &RoadLoad, ego: &EgoState, grade_rad: f64) -> RoadPiece {
+    let (headwind_m_s, crosswind_m_s) =
+        if load.wind.is_calm() { (0.0, 0.0) } else { load.wind.on_course(ego.yaw_rad) };
+    let curvature_1_m = ego.yaw_rate_rad_s / ego.speed_m_s.max(1.0);
+    RoadPiece {
+        sin_grade: libm::sin(grade_rad),
+        cos_grade: libm::cos(grade_rad),
+        curvature_squared_1_m2: curvature_1_m * curvature_1_m,
+        headwind_m_s,
+        crosswind_m_s,
+    }
 }
 
 /// The driveline in one gear.

@@ -98,6 +98,7 @@ pub fn reference_limits() -> VehicleLimits {
             cd_a_m2: 6.2,
             air_density_kg_m3: 1.2,
             rolling_coeff: 0.0062,
+            ..RoadLoad::default()
         },
         brakes: BrakeLimits { max_decel_m_s2: 4.4, dead_time_s: 0.25, build_up_s: 0.8 },
         lateral: reference_lateral(),

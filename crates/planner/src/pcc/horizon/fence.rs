@@ -78,8 +78,7 @@ impl Fence {
         fence.earliest_s.push(f64::NEG_INFINITY);
         for k in 0..course.n() {
             let bound = earliest(k + 1);
-            let held =
-                0.9 * course.brake_m_s2 + truck.resistance_m_s2(e, course.sin[k], course.cos[k]);
+            let held = 0.9 * course.brake_m_s2 + truck.resistance_m_s2(e, &course.road[k]);
             let slowest =
                 (e - COMFORT_M_S2.min(held.max(0.02)) * h).max(slow_e.min(e)).max(E_FLOOR);
             // As fast as without a lead, at its speed, or slower, whichever keeps the fence.

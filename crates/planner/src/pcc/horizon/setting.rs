@@ -116,7 +116,7 @@ impl Setting {
             }
             *ceiling = e;
             let i = k.min(course.n() - 1);
-            let held = course.brake_m_s2 + truck.resistance_m_s2(e, course.sin[i], course.cos[i]);
+            let held = course.brake_m_s2 + truck.resistance_m_s2(e, &course.road[i]);
             e -= 0.8 * (0.9 * held).min(approach).max(0.01) * course.h_m;
         }
         let cruise = cruise_energies(truck, &course, start_e, &hold, &e_max)?;

@@ -8,7 +8,7 @@
 use alloc::{format, vec::Vec};
 
 use road::{ProfilePoint, Road};
-use tractrix_core::VehicleLimits;
+use tractrix_core::{RoadPiece, VehicleLimits, Wind};
 
 use super::truck::Truck;
 use crate::pcc::error::{PccError, check};
@@ -100,10 +100,8 @@ pub struct Course {
     pub start_s_m: f64,
     /// Step, m.
     pub h_m: f64,
-    /// sin of the mean grade, per interval.
-    pub sin: Vec<f64>,
-    /// cos of the mean grade, per interval.
-    pub cos: Vec<f64>,
+    /// Mean grade, curvature and wind, per interval.
+    pub road: Vec<RoadPiece>,
     /// Highest speed by law and curvature, m/s, per node, before band and braking distance.
     pub limit_m_s: Vec<f64>,
     /// Largest planned brake force per mass, m/s².
@@ -136,12 +134,13 @@ impl Course {
         let mut course = Self {
             start_s_m: start,
             h_m: h,
-            sin: Vec::with_capacity(n),
-            cos: Vec::with_capacity(n),
+            road: Vec::with_capacity(n),
             limit_m_s: alloc::vec![f64::INFINITY; n + 1],
             brake_m_s2: tuning.brake_decel_m_s2.min(limits.brakes.max_decel_m_s2),
         };
         course.sample_grades(profile);
+        course.sample_curves(profile);
+        course.sample_wind(profile, &limits.road_load.wind);
         let front = limits.geometry.front_m.clamp(0.0, 50.0);
         let rear = limits.geometry.rear_m().clamp(0.0, 50.0);
         course.sample_limits(profile, front, rear, tuning.lateral_accel_m_s2);
@@ -151,7 +150,7 @@ impl Course {
     /// Number of intervals.
     #[must_use]
     pub fn n(&self) -> usize {
-        self.sin.len()
+        self.road.len()
     }
 
     /// Station of node `k`, m.
@@ -189,10 +188,59 @@ impl Course {
                 last = here;
             }
             let sin = ((height - previous) / self.h_m).clamp(-0.999, 0.999);
-            self.sin.push(sin);
-            self.cos.push(libm::sqrt(1.0 - sin * sin));
+            let cos_grade = libm::sqrt(1.0 - sin * sin);
+            self.road.push(RoadPiece { sin_grade: sin, cos_grade, ..RoadPiece::default() });
             previous = height;
         }
+    }
+
+    /// Mean square of the curvature, which is linear between points.
+    fn sample_curves(&mut self, profile: &[ProfilePoint]) {
+        if profile.iter().all(|p| p.curvature_1_m == 0.0) {
+            return;
+        }
+        let squared: Vec<f64> = profile.iter().map(|p| p.curvature_1_m * p.curvature_1_m).collect();
+        for (k, mean) in self.means(profile, &squared).into_iter().enumerate() {
+            self.road[k].curvature_squared_1_m2 = mean;
+        }
+    }
+
+    /// Wind against and across the course.
+    fn sample_wind(&mut self, profile: &[ProfilePoint], wind: &Wind) {
+        if wind.is_calm() {
+            return;
+        }
+        let (head, cross): (Vec<f64>, Vec<f64>) =
+            profile.iter().map(|p| wind.on_course(p.heading_rad)).unzip();
+        let (head, cross) = (self.means(profile, &head), self.means(profile, &cross));
+        for (piece, (head, cross)) in self.road.iter_mut().zip(head.into_iter().zip(cross)) {
+            (piece.headwind_m_s, piece.crosswind_m_s) = (head, cross);
+        }
+    }
+
+    /// Means over the intervals of what is linear between the points of a profile.
+    fn means(&self, profile: &[ProfilePoint], values: &[f64]) -> Vec<f64> {
+        let (n, mut i) = (self.road.len(), 0);
+        let mut last = (self.start_s_m, values[0]);
+        let mut out = Vec::with_capacity(n);
+        for k in 1..=n {
+            let end = if k == n { profile[profile.len() - 1].s_m } else { self.s_m(k) };
+            let mut area = 0.0;
+            let mut up_to = |here: (f64, f64)| {
+                area += (here.0 - last.0) * 0.5 * (here.1 + last.1);
+                last = here;
+            };
+            while i + 1 < profile.len() && profile[i + 1].s_m <= end {
+                i += 1;
+                up_to((profile[i].s_m, values[i]));
+            }
+            if i + 1 < profile.len() {
+                let f = (end - profile[i].s_m) / (profile[i + 1].s_m - profile[i].s_m);
+                up_to((end, values[i] + f * (values[i + 1] - values[i])));
+            }
+            out.push(area / self.h_m);
+        }
+        out
     }
 
     /// A limit holds for the whole truck: from when its front reaches it until its rear leaves it.
@@ -227,13 +275,13 @@ impl Course {
         let mut e: Vec<f64> =
             self.limit_m_s.iter().map(|&v| energy(v.min(cap_m_s).max(MIN_SPEED_M_S))).collect();
         for k in (0..self.n()).rev() {
-            let held = self.brake_m_s2 + truck.resistance_m_s2(e[k + 1], self.sin[k], self.cos[k]);
+            let held = self.brake_m_s2 + truck.resistance_m_s2(e[k + 1], &self.road[k]);
             // 0.9: the inertia of rotating parts, and room for the solver's interior.
             let decel = (0.9 * held).min(approach_m_s2);
             if decel <= 0.01 {
                 return Err(PccError::BrakesTooWeak {
                     s_m: self.s_m(k),
-                    grade_rad: libm::asin(self.sin[k]),
+                    grade_rad: libm::asin(self.road[k].sin_grade),
                     brake_decel_m_s2: self.brake_m_s2,
                 });
             }

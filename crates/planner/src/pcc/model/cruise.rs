@@ -50,7 +50,7 @@ pub(crate) fn cruise_energies(
         if leg.end_e_j_kg <= 2.0 * E_FLOOR && leg.end_e_j_kg < target {
             return Err(PccError::TooSteep {
                 s_m: course.s_m(k),
-                grade_rad: libm::asin(course.sin[k]),
+                grade_rad: libm::asin(course.road[k].sin_grade),
                 mass_kg: truck.mass_kg,
             });
         }

@@ -113,7 +113,7 @@ impl<'a> Demand<'a> {
         };
         let needed_m_s2 = truck.inertia(drive) * (e1 - e0) / course.h_m
             + at.map_or(0.0, |at| at.overrun_m_s2())
-            + truck.resistance_m_s2(mean, course.sin[k], course.cos[k]);
+            + truck.resistance_m_s2(mean, &course.road[k]);
         Self { needed_m_s2, limit_m_s2: at.map_or(0.0, |at| at.traction_m_s2()), at }
     }
 

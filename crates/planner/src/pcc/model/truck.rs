@@ -13,12 +13,12 @@
 //! | `μ` | (mass + rotating mass)/mass | 1 |
 //!
 //! Eq. 20 of the paper with a gearbox, an overrun and the full-load curve, in space domain.
-//! Left out: wind, tyre warm-up, torque build-up, and the traction gap of a shift, which is charged
+//! Left out: tyre warm-up, torque build-up, and the traction gap of a shift, which is charged
 //! as a fixed amount of fuel per shift.
 
 use alloc::vec::Vec;
 
-use tractrix_core::{FuelModel, GRAVITY_M_S2, VehicleLimits};
+use tractrix_core::{FuelModel, GRAVITY_M_S2, RoadLoad, RoadPiece, VehicleLimits};
 
 use super::engine::TorqueCurves;
 use crate::pcc::error::PccError;
@@ -48,10 +48,11 @@ impl Drive {
 pub struct Truck {
     /// Total mass, kg.
     pub mass_kg: f64,
-    /// Drag per specific energy: `ρ CdA / m`, so that drag per mass is `drag_1_m × E`, 1/m.
+    /// Drag per specific energy in calm air: `ρ CdA / m`, 1/m.
     pub drag_1_m: f64,
-    /// Rolling resistance coefficient.
-    pub rolling_coeff: f64,
+    load: RoadLoad,
+    /// Whether the load has parts that are not linear in the energy.
+    nonlinear: bool,
     /// Engine radians per metre, per gear.
     ratio_rad_m: Vec<f64>,
     efficiency_frac: Vec<f64>,
@@ -79,7 +80,8 @@ impl Truck {
         Ok(Self {
             mass_kg: m,
             drag_1_m: load.air_density_kg_m3 * load.cd_a_m2 / m,
-            rolling_coeff: load.rolling_coeff,
+            load: *load,
+            nonlinear: load.rolling_per_speed_s_m != 0.0 || !load.wind.is_calm(),
             ratio_rad_m: p.gear_ratios.iter().map(|r| r * to_engine).collect(),
             efficiency_frac: p.gear_efficiency_frac.clone(),
             inertia_factor: p.rotating_mass_kg.iter().map(|&r| inertia(r)).collect(),
@@ -124,10 +126,34 @@ impl Truck {
         }
     }
 
-    /// Resistance of road and air per mass at `E` on a grade, m/s².
+    /// Resistance of road and air per mass at `E`, m/s².
     #[must_use]
-    pub fn resistance_m_s2(&self, e_j_kg: f64, sin: f64, cos: f64) -> f64 {
-        self.drag_1_m * e_j_kg + GRAVITY_M_S2 * (sin + self.rolling_coeff * cos)
+    pub fn resistance_m_s2(&self, e_j_kg: f64, road: &RoadPiece) -> f64 {
+        if self.nonlinear {
+            return self.load.resistance_n(libm::sqrt(2.0 * e_j_kg.max(0.0)), road) / self.mass_kg;
+        }
+        // the same without roots: speed squared is twice the energy
+        let l = &self.load;
+        self.drag_1_m * e_j_kg
+            + GRAVITY_M_S2 * (road.sin_grade + l.rolling_coeff * road.cos_grade)
+            + self.curve_1(road) * e_j_kg * e_j_kg
+            + l.constant_drag_n / self.mass_kg
+    }
+
+    /// Its slope in `E`, 1/m.
+    #[must_use]
+    pub fn resistance_slope_1_m(&self, e_j_kg: f64, road: &RoadPiece) -> f64 {
+        if !self.nonlinear {
+            return self.drag_1_m + 2.0 * self.curve_1(road) * e_j_kg;
+        }
+        let step = 0.01 * e_j_kg.max(1.0);
+        let at = |e: f64| self.resistance_m_s2(e, road);
+        (at(e_j_kg + step) - at(e_j_kg - step)) / (2.0 * step)
+    }
+
+    /// Induced drag of a curve per mass and energy squared.
+    fn curve_1(&self, road: &RoadPiece) -> f64 {
+        4.0 * self.load.curve_drag_1_n * self.mass_kg * road.curvature_squared_1_m2
     }
 
     fn engine_speed(&self, g: usize, v: f64) -> f64 {

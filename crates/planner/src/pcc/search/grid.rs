@@ -14,6 +14,8 @@
 
 use alloc::vec::Vec;
 
+use tractrix_core::RoadPiece;
+
 use crate::pcc::model::{Course, Drive, Truck};
 
 /// Energy step of the engine tables, J/kg.
@@ -145,10 +147,8 @@ const GOLDEN: f64 = 0.618_033_988_749_895;
 pub(crate) struct SearchGrid {
     /// Length of an interval, m.
     pub h_m: f64,
-    /// sin of the grade per interval.
-    pub sin: Vec<f64>,
-    /// cos of the grade per interval.
-    pub cos: Vec<f64>,
+    /// Mean grade, curvature and wind per interval.
+    pub road: Vec<RoadPiece>,
     /// Energy step, J/kg.
     pub step_e: f64,
     /// Energy of index 0 (the start), J/kg.
@@ -181,8 +181,15 @@ impl SearchGrid {
             if k < coarse {
                 let range = node..Self::node(n, coarse, k + 1);
                 let len = range.len() as f64;
-                grid.sin.push(course.sin[range.clone()].iter().sum::<f64>() / len);
-                grid.cos.push(course.cos[range].iter().sum::<f64>() / len);
+                let pieces = &course.road[range];
+                let mean = |of: fn(&RoadPiece) -> f64| pieces.iter().map(of).sum::<f64>() / len;
+                grid.road.push(RoadPiece {
+                    sin_grade: mean(|p| p.sin_grade),
+                    cos_grade: mean(|p| p.cos_grade),
+                    curvature_squared_1_m2: mean(|p| p.curvature_squared_1_m2),
+                    headwind_m_s: mean(|p| p.headwind_m_s),
+                    crosswind_m_s: mean(|p| p.crosswind_m_s),
+                });
             }
             if k == 0 {
                 (low, high) = (start_e, start_e);
@@ -206,7 +213,7 @@ impl SearchGrid {
     /// Number of intervals.
     #[must_use]
     pub(crate) fn n(&self) -> usize {
-        self.sin.len()
+        self.road.len()
     }
 
     fn energy(&self, k: usize, i: usize) -> f64 {
@@ -279,8 +286,7 @@ pub(crate) fn search(
         let mut stage = Stage {
             h: grid.h_m,
             step_e: grid.step_e,
-            drag_1_m: truck.drag_1_m,
-            road: truck.resistance_m_s2(0.0, grid.sin[k], grid.cos[k]),
+            resistance: (0.0, 0.0),
             rise: grid.low[k + 1] - grid.low[k],
             brake: prices.brake_m_s2,
             free_cut: prices.free_cut,
@@ -296,6 +302,9 @@ pub(crate) fn search(
                 continue;
             }
             let e0 = grid.energy(k, i);
+            let road = &grid.road[k];
+            stage.resistance =
+                (truck.resistance_m_s2(e0, road), truck.resistance_slope_1_m(e0, road));
             let gained = grid.low[k + 1] - grid.low[k] - i as i32;
             let of_step = grid.step_e / grid.h_m;
             let per_step = prices.accel_penalty_g_s3_m2 * of_step * of_step;
@@ -309,7 +318,7 @@ pub(crate) fn search(
                 let own = cost_of(slot);
                 let (base, came) = if own <= shifted { (own, slot) } else { (shifted, best) };
                 let code = (i * m + came) as u32;
-                stage.expand(gear, slot, (i, e0), (base, code), sum, &of_time);
+                stage.expand(gear, slot, i, (base, code), sum, &of_time);
             }
             if prices.may_roll.get(k).copied().unwrap_or(false) {
                 let slot = m - 1;
@@ -317,7 +326,7 @@ pub(crate) fn search(
                 let (base, came) = if own <= shifted { (own, slot) } else { (shifted, best) };
                 let idle_g = |j: usize| rolling.idle_g_s * 2.0 * grid.h_m / (speeds[i] + after[j]);
                 let way = Way { cost_g: base, from: (i * m + came) as u32 };
-                stage.roll(rolling.inertia, slot, (i, e0), way, &of_time, idle_g);
+                stage.roll(rolling.inertia, slot, i, way, &of_time, idle_g);
             }
         }
         parents.push(next.iter().map(|way| way.from).collect());
@@ -357,9 +366,8 @@ struct Rolling {
 struct Stage<'a> {
     h: f64,
     step_e: f64,
-    drag_1_m: f64,
-    /// Rolling and climbing resistance per mass, m/s².
-    road: f64,
+    /// Resistance per mass at the energy before, m/s², and its slope in the energy, 1/m.
+    resistance: (f64, f64),
     /// Lowest index after minus lowest index before.
     rise: i32,
     brake: f64,
@@ -370,19 +378,19 @@ struct Stage<'a> {
 }
 
 impl Stage<'_> {
-    /// The one edge from index `i` at energy `e0` with the driveline open: to where the truck rolls,
-    /// the end energy rounded by the dither. `way` is the cheapest so far.
+    /// The one edge from index `i` with the driveline open: to where the truck rolls, the end energy
+    /// rounded by the dither. `way` is the cheapest so far.
     fn roll(
         &mut self,
         inertia: f64,
         slot: usize,
-        (i, e0): (usize, f64),
+        i: usize,
         way: Way,
         of_time: &[f64],
         idle_g: impl Fn(usize) -> f64,
     ) {
-        let level = self.road + self.drag_1_m * e0;
-        let slope = self.step_e * (inertia / self.h + 0.5 * self.drag_1_m);
+        let (level, resistance_slope) = self.resistance;
+        let slope = self.step_e * (inertia / self.h + 0.5 * resistance_slope);
         let steps = round_up(self.dither - level / slope) - 1;
         let j = (steps - (self.rise - i as i32)) as usize;
         if j < of_time.len() {
@@ -394,20 +402,20 @@ impl Stage<'_> {
         }
     }
 
-    /// All edges from index `i` at energy `e0` in one gear, at the cost `base` so far.
+    /// All edges from index `i` in one gear, at the cost `base` so far.
     fn expand(
         &mut self,
         gear: &Gear,
         slot: usize,
-        (i, e0): (usize, f64),
+        i: usize,
         (base, code): (f64, u32),
         sum: usize,
         of_time: &[f64],
     ) {
         // need = level + slope × (energy steps gained) + drag
         let inertia = gear.inertia / self.h;
-        let level = self.road + self.drag_1_m * e0;
-        let slope = self.step_e * (inertia + 0.5 * self.drag_1_m);
+        let (level, resistance_slope) = self.resistance;
+        let slope = self.step_e * (inertia + 0.5 * resistance_slope);
         // Braking pays only where the next node's ceiling lies below coasting.
         let level_point = ((sum as i32 - self.rise) as usize + i).min(gear.points.len() - 1);
         let coast = -(level + f64::from(gear.points[level_point].drag)) / (inertia * self.step_e);

@@ -32,9 +32,9 @@ pub(crate) fn may_roll(truck: &Truck, course: &Course, e_max: &[f64], cruise: &[
     // Energy from which rolling just keeps below the ceilings ahead.
     let mut most = e_max[n];
     for k in (0..n).rev() {
-        let held = truck.resistance_m_s2(most, course.sin[k], course.cos[k]);
+        let held = truck.resistance_m_s2(most, &course.road[k]);
         most += held * course.h_m / truck.inertia(Drive::Neutral);
-        may[k] = course.sin[k] < 0.0 || cruise[k] > most;
+        may[k] = course.road[k].sin_grade < 0.0 || cruise[k] > most;
         most = most.min(e_max[k]);
     }
     may

@@ -3,7 +3,7 @@
 //! Around a profile `E⁰` with fixed gears, for interval `k` with mean energy `Ē = (E_k+E_{k+1})/2`:
 //!
 //! - (a) dynamics, solved for the traction:
-//!   `p_k = μ(E_{k+1}-E_k)/h + D⁰ + D'(Ē-Ē⁰) + (ρCdA/m) Ē + g(sin + c_rr cos) + b_k`
+//!   `p_k = μ(E_{k+1}-E_k)/h + D⁰ + D'(Ē-Ē⁰) + R⁰ + R'(Ē-Ē⁰) + b_k`, R the resistance per mass
 //! - (b) duration `2h/(v_k+v_{k+1})`, convex in E (the reciprocal of a concave positive function), to
 //!   first order in the constraint and with its curvature, weighted by the time price, in the cost
 //! - (d) traction `0 <= p_k <= φ⁰ + φ'(Ē-Ē⁰)`, φ the full-load envelope of the gear
@@ -21,8 +21,6 @@
 //! Units: E in J/kg, p and b in m/s², cost in g, time in s.
 
 use alloc::vec::Vec;
-
-use tractrix_core::GRAVITY_M_S2;
 
 use super::sqp::CutModel;
 use crate::pcc::model::{Course, Drive, Operating, Truck, Tuning, duration_s};
@@ -184,11 +182,13 @@ impl Subproblem {
                 Drive::Neutral => None,
             };
             let (overrun, overrun_slope) = around.as_ref().map_or((0.0, 0.0), Around::overrun_line);
-            let slope = overrun_slope + truck.drag_1_m;
+            let road = &course.road[k];
+            let resistance_slope = truck.resistance_slope_1_m(mean, road);
+            let slope = overrun_slope + resistance_slope;
             self.a0[k] = -mu / h + 0.5 * slope;
             self.a1[k] = mu / h + 0.5 * slope;
-            self.r[k] = overrun - overrun_slope * mean
-                + GRAVITY_M_S2 * (course.sin[k] + truck.rolling_coeff * course.cos[k]);
+            self.r[k] = overrun - overrun_slope * mean + truck.resistance_m_s2(mean, road)
+                - resistance_slope * mean;
             let p = (self.a0[k] * e[k] + self.a1[k] * e[k + 1] + self.r[k]).max(0.0);
             match &around {
                 Some(around) => self.traction_and_fuel(around, k, p, cut),

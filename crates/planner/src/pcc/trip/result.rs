@@ -214,7 +214,7 @@ impl Trip {
                     drive_force_n: m * (d.p_m_s2[i] - overrun),
                     brake_force_n: m * d.brake_m_s2[i],
                     fuel_g: d.fuel_g[k],
-                    grade_rad: libm::asin(self.course.sin[i]),
+                    grade_rad: libm::asin(self.course.road[i].sin_grade),
                     engine_power_w: self.truck.engine_power_w(d.drive[i], v, d.p_m_s2[i]),
                 }
             })

@@ -16,7 +16,7 @@
 //!
 //! `beta` is the price of time in g/s; every other quantity is SI.
 
-use tractrix_core::{FuelModel, GRAVITY_M_S2, PowertrainLimits, VehicleLimits};
+use tractrix_core::{FuelModel, GRAVITY_M_S2, PowertrainLimits, RoadPiece, VehicleLimits};
 
 /// Price of a speed below the lowest allowed one, g per J/kg: far above any fuel.
 const SLOW_PRICE: f64 = 60.0;
@@ -28,8 +28,7 @@ pub(crate) struct Task<'a> {
     pub(crate) limits: &'a VehicleLimits,
     /// Interval length, m.
     pub(crate) h_m: f64,
-    pub(crate) sin: &'a [f64],
-    pub(crate) cos: &'a [f64],
+    pub(crate) road: &'a [RoadPiece],
     /// Bounds of the energy per node, J/kg.
     pub(crate) e_min: &'a [f64],
     pub(crate) e_max: &'a [f64],
@@ -191,8 +190,14 @@ impl<'a> Plant<'a> {
     }
 
     fn resistance(&self, k: usize, mean: f64) -> f64 {
-        let roll = self.task.limits.road_load.rolling_coeff;
-        self.air * mean + GRAVITY_M_S2 * (self.task.sin[k] + roll * self.task.cos[k])
+        let (load, road) = (&self.task.limits.road_load, &self.task.road[k]);
+        let (v, w) = ((2.0 * mean).sqrt(), road.headwind_m_s);
+        let roll = load.rolling_coeff + load.rolling_per_speed_s_m * v;
+        let curve = load.curve_drag_1_n * self.mass * (v * v * v * v) * road.curvature_squared_1_m2;
+        self.air * (mean + w * v + 0.5 * w * w)
+            + GRAVITY_M_S2 * (road.sin_grade + roll * road.cos_grade)
+            + curve
+            + load.constant_drag_n / self.mass
     }
 
     /// Interval `k` from `e0` to `e1` in gear `slot` with the figures `at` of its mean energy.
@@ -369,7 +374,7 @@ impl<'a> Sweep<'a> {
     /// Fills the layers backward; `around` limits them to a tube of half width `half`.
     fn backward(&mut self, around: Option<(&[f64], f64)>) {
         let task = self.plant.task;
-        let (n, m) = (task.sin.len(), self.plant.gears.len());
+        let (n, m) = (task.road.len(), self.plant.gears.len());
         self.layers = (0..=n)
             .map(|k| {
                 let (mut low, mut high) = (task.e_min[k] - 1.0, task.e_max[k]);
@@ -408,7 +413,7 @@ impl<'a> Sweep<'a> {
         let task = self.plant.task;
         let mut trip = Trip { e: vec![task.start_e], beta: self.beta, ..Trip::default() };
         let mut before = None;
-        for k in 0..task.sin.len() {
+        for k in 0..task.road.len() {
             let e0 = trip.e[k];
             let mut best = (f64::INFINITY, 0, e0);
             for slot in 0..self.plant.gears.len() {

@@ -63,8 +63,7 @@ pub(crate) fn task<'a>(trip: &'a Trip, limits: &'a VehicleLimits) -> dp::Task<'a
     dp::Task {
         limits,
         h_m: trip.course.h_m,
-        sin: &trip.course.sin,
-        cos: &trip.course.cos,
+        road: &trip.course.road,
         e_min: &trip.e_min,
         e_max: &trip.e_max,
         start_e: trip.cruise.e_j_kg[0],
@@ -79,7 +78,7 @@ pub(crate) fn task<'a>(trip: &'a Trip, limits: &'a VehicleLimits) -> dp::Task<'a
 
 /// Where the reference may open the driveline: on every descent.
 pub(crate) fn descents(trip: &Trip) -> Vec<bool> {
-    trip.course.sin.iter().map(|sin| *sin < 0.0).collect()
+    trip.course.road.iter().map(|piece| piece.sin_grade < 0.0).collect()
 }
 
 /// Fuel, time and largest violation of a plan by the reference's own truck.

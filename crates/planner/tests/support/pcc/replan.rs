@@ -36,8 +36,7 @@ pub(crate) fn windows(trip: &Trip, driven: &Driven, beta_g_s: f64, every: usize)
                 course: Course {
                     start_s_m: trip.course.s_m(k),
                     h_m: trip.course.h_m,
-                    sin: trip.course.sin[intervals.clone()].to_vec(),
-                    cos: trip.course.cos[intervals.clone()].to_vec(),
+                    road: trip.course.road[intervals.clone()].to_vec(),
                     limit_m_s: trip.course.limit_m_s[nodes.clone()].to_vec(),
                     brake_m_s2: trip.course.brake_m_s2,
                 },
