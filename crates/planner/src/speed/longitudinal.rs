@@ -253,7 +253,8 @@ impl LongitudinalController {
         limits: &VehicleLimits,
         accel_m_s2: f64,
     ) -> Option<f64> {
-        let slope_n = resistance_n(&limits.road_load, 0.0, target.grade_rad);
+        let load = &limits.road_load;
+        let slope_n = load.resistance_n(0.0, &road_under(load, ego, target.grade_rad));
         let stands = ego.speed_m_s.abs() < STANDS_M_S;
         let to_stand = accel_m_s2 <= 0.0;
         if to_stand && stands {
