@@ -8,6 +8,7 @@
 //! into each of its gaps.
 
 use super::{LEAVE_WITHIN_M, LaneChoice, View};
+use crate::safety::in_lane;
 use road::LaneEnd;
 
 /// A return must last, s: the 20 s after which German courts see a right lane as usable.
@@ -28,9 +29,12 @@ pub(crate) fn keep_right(
     let ends_soon = view.road.lanes().get(usize::from(lane)).is_none_or(|track| {
         track.end != LaneEnd::Continues && track.s_end_m - view.ego.s_m < LEAVE_WITHIN_M + stay_m
     });
-    let ahead_serves = view.ahead(lane).is_none_or(|(lead, gap_m)| {
-        let closing_m = STAY_S * (wish_m_s - lead.speed_m_s).max(0.0);
-        gap_m >= leaving_gap_m(lead.speed_m_s) + closing_m
+    // Every vehicle there counts: a slow one may be hidden by a fast one that will be gone.
+    let (front_m, width_m) = (view.extent.front_s_m, view.extent.width_m);
+    let ahead = view.scene.neighbours.iter().filter(|n| n.front_s_m > front_m);
+    let ahead_serves = ahead.filter(|n| in_lane(view.road, lane, n, width_m)).all(|n| {
+        let closing_m = STAY_S * (wish_m_s - n.speed_m_s).max(0.0);
+        n.rear_s_m - front_m >= leaving_gap_m(n.speed_m_s) + closing_m
     });
     let behind_serves = view.behind(lane).is_none_or(|(_, gap_m)| gap_m >= rear_gap_m);
     if !ends_soon && ahead_serves && behind_serves { LaneChoice::Right } else { LaneChoice::Keep }

@@ -182,7 +182,7 @@ fn overtake(spacing_m: f64, by_mobil: bool) -> (Vec<u32>, f64) {
     let (v, slow, d) = (22.0, 18.0, 50.0);
     let config = MobilConfig::default();
     let (mut lane, mut changes, mut right_s) = (0, Vec::new(), 0);
-    let last_s = 700;
+    let last_s = 1_100;
     for t in 0..last_s {
         let at = |k: u32| 1_500.0 + spacing_m * f64::from(k) + slow * f64::from(t);
         let neighbours = (0..6).map(|k| Neighbour {

@@ -92,7 +92,8 @@ mod tests {
     #[test]
     fn on_the_flat_the_prices_are_those_of_the_closed_form() {
         // P_wheel = m g c_r v + rho CdA v³ / 2: a metre's fuel falls by q rho CdA v per m/s, a
-        // metre's time by 1/v², so that a second costs q rho CdA v³.
+        // metre's time by 1/v², so that a second costs q rho CdA v³; the engine's friction, which
+        // grows with its speed and is left out, adds 5 %.
         let truck = reference_limits();
         let flat: Vec<ProfilePoint> = (0..=400)
             .map(|i| ProfilePoint {
@@ -113,7 +114,8 @@ mod tests {
         let price = Price::of_trip(&request).unwrap();
         let load = &truck.road_load;
         let closed = price.energy_g_j * load.air_density_kg_m3 * load.cd_a_m2 * v * v * v;
-        assert!((price.time_g_s / closed - 1.0).abs() < 0.05, "{price:?}, {closed}");
+        let more_frac = price.time_g_s / closed - 1.0;
+        assert!((0.0..0.1).contains(&more_frac), "{price:?}, {closed}");
         // 180 to 230 g/kWh at the crank, 90 to 97 % of it at the wheels.
         let g_kwh = price.energy_g_j * 3.6e6;
         assert!((180.0..250.0).contains(&g_kwh), "{g_kwh}");
