@@ -68,9 +68,12 @@ def running(
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None
-            line = process.stderr.readline()
-            address = re.search(r"http://127\.0\.0\.1:\d+", line)
-            assert address is not None, line
+            said = ""
+            address = None
+            while address is None and (line := process.stderr.readline()):
+                said += line
+                address = re.search(r"http://127\.0\.0\.1:\d+", line)
+            assert address is not None, said
             yield Run(process, address.group())
         finally:
             process.kill()
@@ -315,6 +318,55 @@ def test_the_vehicle_ahead_is_named_with_gap_and_times(
             "Changes to the left lane",
             "Changes to the right lane",
         )
+
+
+def test_the_saving_against_cruise_control_is_live_and_says_what_traffic_cost(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    with running(server, tmp_path, "--pace", "20") as run:
+        page.goto(run.url)
+        page.wait_for_selector("#ghost-tile", state="visible")
+        page.wait_for_function("document.getElementById('station').textContent > '1.5'")
+        page.click("#play")
+        page.wait_for_function(
+            "document.getElementById('state').textContent === 'paused'"
+        )
+        settled_time_s(run)
+        ghost = run.get("/api/v1/state")["ghost"]
+        assert ghost["s_m"] > 500.0
+        assert shown(page, "saving") == pytest.approx(
+            100 * ghost["saving_frac"], abs=0.051
+        )
+        said = page.inner_text("#saving-sub")
+        assert (
+            f"{ghost['ego_fuel_g'] / 1000:.2f} / {ghost['fuel_g'] / 1000:.2f} kg"
+            in said
+        )
+        assert f"traffic {ghost['held_up_s']:.0f} s" in said
+        assert ("free road" in page.inner_text("#saving-free")) == (
+            ghost["held_up_s"] > 0
+        )
+
+
+def test_leaving_the_road_is_said_in_a_banner(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    """The trailer cuts a bend of 25 m across the border; a level road has no ghost's gain."""
+    rows = ["s_m,z_m,curvature_1_m,speed_limit_m_s"]
+    for s in range(0, 1201, 10):
+        rows.append(f"{s},0,{-1 / 25 if 700 <= s <= 760 else 0},25")
+    road = tmp_path / "bend.csv"
+    road.write_text("\n".join(rows) + "\n")
+    options = ["flat", "--road", str(road), "--pace", "max", "--keep-open"]
+    with running(server, tmp_path / "run", *options, "--allow-off-road") as run:
+        page.goto(run.url)
+        page.wait_for_function(
+            "document.getElementById('state').textContent === 'finished'"
+        )
+        assert page.get_attribute("#banner", "role") == "alert"
+        page.wait_for_selector("#banner", state="visible")
+        assert "Off the road" in page.inner_text("#banner")
+        assert run.finish() == 0
 
 
 def test_a_refused_lane_change_says_why(

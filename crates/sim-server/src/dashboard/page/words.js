@@ -55,8 +55,9 @@ const speedSource = from({
   fallback: "cruise control, no predictive plan here",
 });
 
-// What sets the speed now: the vehicle ahead, or the plan.
+// What sets the speed now: traffic or the plan.
 export function speedBy(plan) {
   const source = speedSource(plan.speed_status);
-  return plan.following === null ? `Free: ${source}` : `Follows #${plan.following} (${source})`;
+  if (!plan.held_up) return `Free: ${source}`;
+  return `${plan.following === null ? "Held up by traffic" : `Held up by #${plan.following}`} (${source})`;
 }
