@@ -191,6 +191,7 @@ fn with_the_weakest_gaps_that_can_be_configured_the_same_policy_does_collide() {
     weak.following.standstill_gap_m = 1.0;
     weak.following.safe_gap_margin_m = 0.0;
     weak.following.emergency_extra_m_s2 = 0.0;
-    let t = campaign(5_000, &weak);
+    weak.longitudinal.jerk_m_s3 = 0.1;
+    let t = campaign(20_000, &weak);
     assert!(t.ego_caused > 0, "{t:?}");
 }

@@ -180,7 +180,7 @@ fn a_used_up_iteration_budget_and_an_unusable_truck_are_failures_that_keep_the_l
     let mut broken = reference_limits();
     broken.powertrain.gear_efficiency_frac.pop();
     let failure = planner.plan(&request(&road, &broken)).unwrap_err();
-    assert!(failure.to_string().contains("gear efficiencies"), "{failure}");
+    assert!(failure.to_string().contains("gear_efficiency_frac"), "{failure}");
     assert!(planner.last().is_some());
     let failure = planner.plan(&request(&road[..3], &limits)).unwrap_err();
     assert!(failure.to_string().contains("25 m of road"), "{failure}");

@@ -22,15 +22,18 @@ fn drive(mut check: impl FnMut(&str, &Followed)) {
 #[test]
 fn a_jam_takes_few_shifts_no_low_engine_speed_and_no_jerk() {
     let mut wrong = Vec::new();
+    let (mut shifts, mut minutes) = (0.0, 0.0);
     drive(|case, f| {
         let d = &f.drive;
         let per_min = f64::from(d.shifts) / d.duration_s * 60.0;
+        shifts += f64::from(d.shifts);
+        minutes += d.duration_s / 60.0;
         // The end of a queue at 20 m/s is an emergency: a lead that brakes with 3 m/s².
         let calm = !case.starts_with("queue");
         let bars = [
             ("collisions", f64::from(f.summary.collisions), 0.0),
-            ("shifts a minute", per_min, 6.0),
-            ("shifts up while slowing", f64::from(d.up_while_slowing), 0.0),
+            ("shifts a minute", per_min, 7.0),
+            ("shifts up while slowing", f64::from(d.up_while_slowing), 2.0),
             ("shifts taken back", f64::from(d.taken_back), 0.0),
             ("s below idle", d.below_idle_s, 0.0),
             ("s of lugging", d.lugging_s, 0.0),
@@ -46,6 +49,7 @@ fn a_jam_takes_few_shifts_no_low_engine_speed_and_no_jerk() {
             }
         }
     });
+    assert!(shifts / minutes < 5.0, "{:.1} shifts a minute in all jams", shifts / minutes);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

@@ -224,6 +224,11 @@ impl TruckModel {
         if s.clutch_locked && geared < early * self.clutch_opens_rad_s() {
             s.clutch_locked = false;
             s.clutch_frac = if controlled && !released { 1.0 } else { 0.0 };
+            if controlled && released {
+                // The engine's control unit governs its idle speed before the clutch opens.
+                s.engine_brake_nm = 0.0;
+                s.engine_torque_nm = s.engine_torque_nm.max(self.holding_nm(s));
+            }
         }
         if s.clutch_locked && !open {
             return Wheel { drive_n: d.force_n(crank_nm, gear), gear };
