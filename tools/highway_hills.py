@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Grades of the built-in highway from a recorded drive cycle.
 
     python3 tools/highway_hills.py drivecycle.csv > crates/road/data/highway_hills.csv
@@ -56,7 +55,9 @@ def main() -> None:
     print(HEAD)
     for i in range(round(LENGTH_M / STEP_M) + 1):
         s = FIRST_M + i * STEP_M
-        slope = (height_at(near, s + STEP_M) - height_at(near, s - STEP_M)) / (2 * STEP_M)
+        slope = (height_at(near, s + STEP_M) - height_at(near, s - STEP_M)) / (
+            2 * STEP_M
+        )
         print(f"{i * STEP_M:.0f},{slope:.5f}")
 
 

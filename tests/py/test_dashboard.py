@@ -250,7 +250,9 @@ def test_a_tab_that_stays_open_shows_the_next_run_on_its_port(
         tab.wait_for_function(
             "document.getElementById('state').textContent === 'running'"
         )
-        assert tab.inner_text("#station-sub").split("·")[0] != first_length.split("·")[0]
+        assert (
+            tab.inner_text("#station-sub").split("·")[0] != first_length.split("·")[0]
+        )
         plots_are_there(tab)
     tab.close()
 
