@@ -31,7 +31,7 @@ fn a_value_out_of_range_is_named_with_its_bounds() {
 fn an_unknown_road_or_truck_is_named() {
     let e = broken("builtin:highway", "builtin:motorway");
     assert!(e.contains("builtin:motorway"), "{e}");
-    let e = broken("file = \"sinotruk\"", "file = \"scania\"");
+    let e = broken("file = \"longhaul\"", "file = \"scania\"");
     assert!(e.contains("scania"), "{e}");
 }
 

@@ -134,7 +134,7 @@ fn ctrl_c_sigterm_and_a_hangup_finish_the_recording_and_the_summary() {
         let folder = tempfile::tempdir().unwrap();
         let recording = folder.path().join("run.mcap");
         let arguments = ["run", "--headless", "--pace", "20", "--out"];
-        let mut run = under_way(program().args(arguments).arg(folder.path()), &recording, 100_000);
+        let mut run = under_way(program().args(arguments).arg(folder.path()), &recording, 600_000);
         signal(&run, name);
         assert_eq!(run.wait().unwrap().code(), Some(0));
         let summary = json(&folder.path().join("summary.json"));

@@ -45,7 +45,18 @@ fn lane(folder: &Path, width_m: f64, limit_m_s: f64) -> String {
 /// Exit code and stderr of both commands on a road.
 fn both(road: &str, folder: &Path) -> [(Option<i32>, String); 2] {
     let out = folder.join("out").display().to_string();
-    let run = ["run", "flat", "--road", road, "--headless", "--duration", "1", "--out", &out];
+    let run = [
+        "run",
+        "flat",
+        "--road",
+        road,
+        "--headless",
+        "--duration",
+        "1",
+        "--overwrite",
+        "--out",
+        &out,
+    ];
     [&["map", "check", road][..], &run].map(|arguments| {
         let output = server(arguments);
         let both = [output.stdout, output.stderr].concat();

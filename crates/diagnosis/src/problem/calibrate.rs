@@ -69,7 +69,8 @@ fn floor(m: Module) -> f64 {
         Module::Force | Module::Imu | Module::Gps => 1e-3,
         Module::Torque => 0.2,
         Module::Fuel => 0.05,
-        Module::Brake => 0.3,
+        // messages of 4 kPa a bit, mean of two samples
+        Module::Brake => 0.8,
         Module::Shift => 0.02,
         Module::Yaw | Module::TrailerYaw | Module::Heading => 5e-5,
         Module::AccelY | Module::Altitude => 1e-2,

@@ -105,6 +105,9 @@ impl GradeBySection {
     }
 }
 
+/// Indicated torque up to which a message of 1 % a bit with its noise may be one of an engine that
+/// is cut off, percent of the reference torque.
+const CUT_OFF_PERCENT: f64 = 2.5;
 /// Torque above which nobody brakes, percent, and samples until brakes that were on are off.
 const PULLS: f64 = 3.0;
 const RELEASE: i32 = 30;
@@ -306,8 +309,12 @@ impl Prepared {
         }
         if self.has(&[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm]) {
             valid[M::Fuel as usize] = rows(M::Fuel, &|a, b| {
-                // no fuel at all is the overrun cut-off of the engine control, not its map
-                (a..b).all(|i| self.engaged[i] && self.speed[i] > 3.0 && self.fuel[i] > 0.0)
+                // no fuel at all is the overrun cut-off of the engine control, not its map, and
+                // within the torque message's noise of zero it cannot be told from idling along
+                (a..b).all(|i| {
+                    let burns = self.fuel[i] > 0.0 && self.torque[i] > CUT_OFF_PERCENT;
+                    self.engaged[i] && self.speed[i] > 3.0 && burns
+                })
             });
         }
         if self.has(&[C::SteeringWheelRad]) {

@@ -40,6 +40,12 @@ pub(super) fn foreign() -> Response {
     error(StatusCode::FORBIDDEN, "foreign_page", "only pages of this server may ask")
 }
 
+/// A body that is too long, or broke off.
+pub(super) fn body_not_read() -> Response {
+    let why = "the body is too long, or broke off";
+    error(StatusCode::PAYLOAD_TOO_LARGE, "body_not_read", why)
+}
+
 /// The latest frame.
 pub(super) async fn state(State(shared): State<Arc<Shared>>) -> Response {
     let frame = shared.frame.borrow().clone();
@@ -74,10 +80,7 @@ pub(super) async fn control(
     State(shared): State<Arc<Shared>>,
     body: Result<Bytes, BytesRejection>,
 ) -> Response {
-    let Ok(body) = body else {
-        let why = "the body is too long, or broke off";
-        return error(StatusCode::PAYLOAD_TOO_LARGE, "body_not_read", why);
-    };
+    let Ok(body) = body else { return body_not_read() };
     let control = match Control::from_json(&body) {
         Ok(control) => control,
         Err(e) => return error(StatusCode::BAD_REQUEST, e.code(), &e.to_string()),

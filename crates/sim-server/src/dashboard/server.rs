@@ -77,9 +77,24 @@ async fn report(State(shared): State<Arc<Shared>>) -> Response {
 }
 
 /// Refuses requests that another web site makes through the user's browser: a foreign `Host`
-/// (a name bound to 127.0.0.1) or a foreign `Origin`.
+/// (a name bound to 127.0.0.1) or a foreign `Origin`; and bodies that are announced as too long.
 async fn local_only(request: Request, next: Next) -> Response {
-    if is_own(request.headers()) { next.run(request).await } else { api::foreign() }
+    if !is_own(request.headers()) {
+        api::foreign()
+    } else if announced_bytes(request.headers()) > LONGEST_BODY {
+        api::body_not_read()
+    } else {
+        next.run(request).await
+    }
+}
+
+/// Longest body that is waited for, bytes: a control is a line.
+const LONGEST_BODY: u64 = 16_384;
+
+/// Length that a request says its body has, bytes.
+fn announced_bytes(headers: &HeaderMap) -> u64 {
+    let length = headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok());
+    length.and_then(|l| l.parse().ok()).unwrap_or(0)
 }
 
 fn is_own(headers: &HeaderMap) -> bool {
