@@ -98,10 +98,13 @@ impl tractrix_core::Recorder for Quiet {
     fn record(&mut self, _tick: &tractrix_core::Tick<'_>) {}
 }
 
+/// What is set alone: its name, figures of the truck file, and what else the test reads.
+type Case = (&'static str, &'static [(&'static str, f64)], &'static str, f64);
+
 #[test]
 fn each_effect_of_a_truck_file_costs_what_the_plan_promises_within_half_a_per_cent() {
     // change of the promise against the truck file as it is, at least
-    let cases: [(&str, &[(&str, f64)], &str, f64); 10] = [
+    let cases: [Case; 10] = [
         ("as it is", &[], "", 0.0),
         ("no drag in bends", &[("resistance.curve_drag_coeff", 0.0)], "", -0.05),
         ("rolling by speed", &[("resistance.rolling_per_speed_s_m", 6e-5)], "", 0.08),

@@ -58,8 +58,8 @@ impl Neighbourhood {
         if n > piece {
             ends = in_pieces(workers, ranges(n, piece), |_, range| {
                 let (mut ahead, mut behind) = (nobody.clone(), nobody.clone());
-                seen.from_the_front(range.clone(), &mut ahead, |_, _| {});
-                seen.from_the_back(range, &mut behind, |_, _| {});
+                seen.visit_front_first(range.clone(), &mut ahead, |_, _| {});
+                seen.visit_back_first(range, &mut behind, |_, _| {});
                 (ahead, behind)
             });
         }
@@ -87,10 +87,10 @@ impl Neighbourhood {
                 *lanes = [lane, left, right];
             }
             // From the front: the last one seen in a lane is the leader of the next one.
-            seen.from_the_front(range.clone(), &mut ahead, |i, nearest| {
+            seen.visit_front_first(range.clone(), &mut ahead, |i, nearest| {
                 leader[i - from] = look(lanes[i - from], nearest);
             });
-            seen.from_the_back(range, &mut behind, |i, nearest| {
+            seen.visit_back_first(range, &mut behind, |i, nearest| {
                 follower[i - from] = look(lanes[i - from], nearest);
             });
         });
@@ -115,7 +115,7 @@ fn look([own, left, right]: [u16; 3], nearest: &[u32]) -> [u32; 3] {
 impl Seen<'_> {
     /// Visits a range from its front, with the nearest one ahead in each lane; `nearest` begins with
     /// those ahead of the range.
-    fn from_the_front(
+    fn visit_front_first(
         &self,
         range: Range<usize>,
         nearest: &mut [u32],
@@ -136,7 +136,7 @@ impl Seen<'_> {
     }
 
     /// The same from its back.
-    fn from_the_back(
+    fn visit_back_first(
         &self,
         range: Range<usize>,
         nearest: &mut [u32],

@@ -82,7 +82,7 @@ fn points(lines: &LaneLines, marking: &Marking) -> (Paint, Vec<Vector3>) {
         Paint::Solid => all().map(|(_, p)| point(p)).collect(),
         Paint::Dashed => all()
             .zip(all().skip(1))
-            .filter(|((i, _), _)| (lines.first + i) % DASH_EVERY == 0)
+            .filter(|((i, _), _)| (lines.first + i).is_multiple_of(DASH_EVERY))
             .flat_map(|((_, a), (_, b))| [point(a), point(b)])
             .collect(),
     };
