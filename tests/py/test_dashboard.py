@@ -234,7 +234,8 @@ def test_a_tab_that_stays_open_shows_the_next_run_on_its_port(
     # Not the fixture: while nobody answers, the browser says so on the console.
     tab = browser.new_page()
     tab.set_default_timeout(WAIT_MS)
-    options = ["--duration", "20", "--pace", "max", "--keep-open"]
+    road = str(Path(__file__).parents[2] / "examples" / "road.csv")
+    options = ["--road", road, "--duration", "20", "--pace", "max", "--keep-open"]
     with running(server, tmp_path / "first", "flat", *options) as run:
         tab.goto(run.url)
         tab.wait_for_function(
