@@ -16,7 +16,7 @@ pub struct LateralState {
     /// Trailer heading minus tractor heading, rad.
     pub articulation_rad: f64,
     /// v_yc: lateral speed of the tractor's CG in the 4-state model, m/s. Below the blend
-    /// [`LateralModel::outputs`] has the true one.
+    /// `LateralModel::outputs` has the true one.
     pub cg_lateral_speed_m_s: f64,
     /// omega_c of the 4-state model, rad/s.
     pub yaw_rate_rad_s: f64,

@@ -13,7 +13,7 @@ use crate::native::TrafficConfig;
 pub struct SumoConfig {
     /// The traffic; `sees_ego` chooses between the modes `inter` and `pure`.
     pub traffic: TrafficConfig,
-    /// The native `sumo`; `None`: looked for, see [`Programs::find`].
+    /// The native `sumo`; `None`: looked for, see `Programs::find`.
     pub binary: Option<PathBuf>,
     /// Waiting times.
     pub timeouts: Timeouts,

@@ -187,7 +187,7 @@ impl SumoTraffic {
         Ok(())
     }
 
-    /// Reads any variable: traffic lights ([`id::TRAFFIC_LIGHT`]), vehicle types, routes, ….
+    /// Reads any variable: traffic lights (`id::TRAFFIC_LIGHT`), vehicle types, routes, ….
     ///
     /// # Errors
     /// [`SumoError::Refused`] with SUMO's words; connection errors.
