@@ -160,7 +160,8 @@ impl World {
         py.detach(|| {
             let scenario = changed(name, json, &changes)?;
             let seed = scenario.seed(seed).map_err(|e| Fault::of_input(&e))?;
-            let world = sim::World::new(&scenario, seed).map_err(|e| Fault::of_input(&e))?;
+            let mut world = sim::World::new(&scenario, seed).map_err(|e| Fault::of_input(&e))?;
+            world.attach_ghost().map_err(|e| Fault::of_input(&e))?;
             Ok(Self(Mutex::new(Some(Drive {
                 world,
                 seed,

@@ -11,7 +11,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         "dynamics",
         "planner",
         "traffic-client",
-        "j1939",
+        "tractrix-j1939",
     ];
     BTreeMap::from([
         ("tractrix-core", vec![]),
@@ -20,21 +20,22 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("driver-models", vec![]),
         ("planner", vec!["tractrix-core", "road", "driver-models"]),
         ("traffic-client", vec!["tractrix-core", "road", "driver-models"]),
-        ("j1939", vec!["tractrix-core"]),
+        ("tractrix-j1939", vec!["tractrix-core"]),
         ("sim", plant.clone()),
-        ("diagnosis", vec!["tractrix-core", "road", "dynamics", "j1939"]),
-        ("truck-node", vec!["tractrix-core", "road", "driver-models", "planner", "j1939"]),
+        ("diagnosis", vec!["tractrix-core", "road", "dynamics", "tractrix-j1939"]),
+        ("truck-node", vec!["tractrix-core", "road", "driver-models", "planner", "tractrix-j1939"]),
         ("tractrix-python", [&plant[..], &["sim", "diagnosis"]].concat()),
         ("sim-server", [plant, vec!["sim", "diagnosis"]].concat()),
     ])
 }
 
 /// Third-party crates that only one room may know.
-const ONLY: [(&str, &[&str]); 4] = [
+const ONLY: [(&str, &[&str]); 5] = [
     ("tokio", &["sim-server"]),
     ("axum", &["sim-server"]),
     ("pyo3", &["tractrix-python"]),
     ("clarabel", &["planner"]),
+    ("socketcan", &["tractrix-j1939"]),
 ];
 
 #[test]

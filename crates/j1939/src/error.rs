@@ -1,0 +1,29 @@
+//! Errors of the J1939 core.
+
+/// What a caller or a bus can get wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum J1939Error {
+    /// Priorities have three bits.
+    #[error("priority {0} is not one of 0 to 7")]
+    Priority(u8),
+    /// Parameter group numbers have 18 bits, and those with a destination end in a zero byte.
+    #[error("PGN {0} does not exist: 18 bits, and a zero last byte below PDU format 240")]
+    Pgn(u32),
+    /// A parameter group of format PDU2 goes to everybody.
+    #[error("PGN {pgn} goes to everybody, it cannot go to address {da:#04X}")]
+    Destination {
+        /// The parameter group.
+        pgn: u32,
+        /// The address asked for.
+        da: u8,
+    },
+    /// A classic CAN frame has at most eight bytes.
+    #[error("a frame of PGN {pgn} cannot hold {len} bytes, eight at most")]
+    Length {
+        /// The parameter group.
+        pgn: u32,
+        /// Bytes asked for.
+        len: usize,
+    },
+}
