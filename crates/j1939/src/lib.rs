@@ -5,16 +5,21 @@
 //! |---|---|---|
 //! | `id` | priority, PGN, destination and source of a 29-bit identifier | SAE J1939-21, 5.2 |
 //! | `frame` | an identifier and up to eight bytes | SAE J1939-21, 5.1 |
+//! | `wire` | how long a frame takes, how busy a bus is | ISO 11898-1 |
+//! | `bus` | the trait of a bus; buses in memory, of logs, of the kernel, over TCP | |
 //!
 //! The core needs neither an allocator nor an operating system (`no_std`); the features `alloc` and
 //! `std` add owned buffers and the buses. Nothing that comes from a bus can panic here: what cannot
 //! be decoded is an error value with its PGN.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+pub mod bus;
 mod error;
 mod frame;
 mod id;
+mod wire;
 
 pub use error::J1939Error;
 pub use frame::Frame;
 pub use id::{GLOBAL_ADDRESS, Id, NULL_ADDRESS, PGN_MAX};
+pub use wire::{BitRate, BusLoad, frame_bits};

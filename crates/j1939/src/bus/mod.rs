@@ -1,0 +1,60 @@
+//! Where frames come from and go to: one trait, several buses.
+//!
+//! | module | what it is | feature |
+//! |---|---|---|
+//! | `loopback` | a bus in memory with bit times, stuffing and arbitration | `std` |
+//! | `faults` | loss, delay, duplicates, corruption and bus-off around any bus | `std` |
+//! | `tap` | every frame both ways to a recorder | |
+//! | `candump` | logs of the tool of that name: read, write, replay | `std` |
+
+#[cfg(feature = "std")]
+pub mod candump;
+mod error;
+#[cfg(feature = "std")]
+pub mod faults;
+#[cfg(feature = "std")]
+pub mod loopback;
+pub mod tap;
+
+pub use error::BusError;
+use tractrix_core::{Stamped, Time};
+
+use crate::Frame;
+
+/// A classic CAN bus as one node has it. Calls never wait, and what a bus holds for a node is
+/// bounded. A node does not receive what it sent itself.
+pub trait Bus {
+    /// Puts a frame in the send queue at `now`.
+    ///
+    /// # Errors
+    /// [`BusError::Full`] when the queue has no room: the frame is not sent. Other errors say that
+    /// the bus cannot be used at present.
+    fn send(&mut self, now: Time, frame: &Frame) -> Result<(), BusError>;
+
+    /// The next frame that has come in by `now`, with the time of its end; none when there is none.
+    ///
+    /// # Errors
+    /// When the bus cannot be used at present, or a log cannot be read.
+    fn receive(&mut self, now: Time) -> Result<Option<Stamped<Frame>>, BusError>;
+}
+
+impl<B: Bus + ?Sized> Bus for &mut B {
+    fn send(&mut self, now: Time, frame: &Frame) -> Result<(), BusError> {
+        (**self).send(now, frame)
+    }
+
+    fn receive(&mut self, now: Time) -> Result<Option<Stamped<Frame>>, BusError> {
+        (**self).receive(now)
+    }
+}
+
+#[cfg(feature = "std")]
+impl<B: Bus + ?Sized> Bus for Box<B> {
+    fn send(&mut self, now: Time, frame: &Frame) -> Result<(), BusError> {
+        (**self).send(now, frame)
+    }
+
+    fn receive(&mut self, now: Time) -> Result<Option<Stamped<Frame>>, BusError> {
+        (**self).receive(now)
+    }
+}
