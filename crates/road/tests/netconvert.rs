@@ -92,8 +92,11 @@ fn compare(road: &Road) -> Option<(f64, f64, usize)> {
                 let centres = lanes().map(|l| (l.center_d_m(at.s_m) - at.d_m).abs());
                 across = across.max(centres.fold(f64::MAX, f64::min));
             }
-            // netconvert leaves bank out: the reference line's height for all lanes.
-            height = height.max((road.at(at.s_m, 0.0).z_m - z).abs());
+            // netconvert leaves bank out (the reference line's height for all lanes), and moves the
+            // ends of lanes along the slope where it joins them.
+            if !joint {
+                height = height.max((road.at(at.s_m, 0.0).z_m - z).abs());
+            }
         }
     }
     Some((across, height, lanes.len()))

@@ -138,8 +138,8 @@ fn killed_in(out: &Path, options: &[&str]) -> std::process::Output {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // SUMO is started with the first scene; the recording grows once the run goes on.
-    let begun = |out: &Path| out.join("run.mcap").metadata().is_ok_and(|m| m.len() > 100_000);
+    // The road is recorded before SUMO is there: the run goes on once much more than that came.
+    let begun = |out: &Path| out.join("run.mcap").metadata().is_ok_and(|m| m.len() > 1_000_000);
     let start = Instant::now();
     let sumo = loop {
         if let Some(sumo) = child_of(run.id()).filter(|_| begun(out)) {
