@@ -8,8 +8,8 @@
 //! incentive  ã - a + p [ (ã_n - a_n) + (ã_o - a_o) ] > Δa_th  (+ a_bias against, - towards keep-right)
 //! ```
 //! p politeness (0 selfish, 1 altruistic), b_safe (m/s²), Δa_th changing threshold (m/s²), a_bias
-//! keep-right bias (m/s²). Beyond the paper, the changing driver too must not have to brake
-//! harder than b_safe. Left out: the passing rule on the right (asymmetric MOBIL's Eq. 6).
+//! keep-right bias (m/s²). Beyond the paper, [`Mobil::is_safe`] also asks that the changing driver
+//! need not brake harder than b_safe. Left out: the passing rule on the right (asymmetric MOBIL's Eq. 6).
 
 /// Parameters of one driver's lane changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,12 +42,18 @@ pub struct Change {
 }
 
 impl Mobil {
-    /// The safety criterion.
+    /// The paper's safety criterion.
+    #[inline]
+    #[must_use]
+    pub fn spares_new_follower(&self, c: &Change) -> bool {
+        c.new_follower_after_m_s2 >= -self.safe_decel_m_s2
+    }
+
+    /// The paper's criterion, and the changing driver need not brake harder either.
     #[inline]
     #[must_use]
     pub fn is_safe(&self, c: &Change) -> bool {
-        c.new_follower_after_m_s2 >= -self.safe_decel_m_s2
-            && c.own_after_m_s2 >= -self.safe_decel_m_s2
+        self.spares_new_follower(c) && c.own_after_m_s2 >= -self.safe_decel_m_s2
     }
 
     /// The advantage over the threshold, m/s²; a change pays if it is positive.
@@ -114,6 +120,7 @@ mod tests {
         };
         assert!(m.is_safe(&CHANGE));
         assert!(!m.is_safe(&Change { new_follower_after_m_s2: -2.1, ..CHANGE }));
-        assert!(!m.is_safe(&Change { own_after_m_s2: -2.1, ..CHANGE }));
+        let own = Change { own_after_m_s2: -2.1, ..CHANGE };
+        assert!(!m.is_safe(&own) && m.spares_new_follower(&own));
     }
 }
