@@ -1,6 +1,6 @@
 //! Closed loop over scenarios, seeds and deciders: collisions, hard braking caused, shifts, jerk.
 //!
-//! `cargo run --release -p sim --example campaign -- [--km 1000] [--first-seed 1]
+//! `cargo run --release -p sim --example kilometres -- [--km 1000] [--first-seed 1]
 //! [--scenarios a,b] [--deciders keep,rules50,rules100,rules150,mobil] [--json FILE]` drives every
 //! scenario with every decider, seed after seed, until the kilometres are full, and prints one row
 //! per scenario and decider; `--json` writes the same. A collision's scenario, decider, seed and
