@@ -1,7 +1,9 @@
 //! Errors of the J1939 core.
 
+use crate::Slot;
+
 /// What a caller or a bus can get wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum J1939Error {
     /// Priorities have three bits.
@@ -25,5 +27,27 @@ pub enum J1939Error {
         pgn: u32,
         /// Bytes asked for.
         len: usize,
+    },
+    /// A message is shorter than the shortest edition of its layout.
+    #[error("PGN {pgn} from {sa:#04X} has {len} bytes, it needs {need}")]
+    Short {
+        /// The parameter group.
+        pgn: u32,
+        /// Who sent it.
+        sa: u8,
+        /// Its bytes.
+        len: usize,
+        /// Bytes of the shortest edition.
+        need: usize,
+    },
+    /// A number outside the data band, or a state that the signal has no raw value for.
+    #[error("PGN {pgn}: {signal} cannot say {slot:?}")]
+    NotEncodable {
+        /// The parameter group.
+        pgn: u32,
+        /// The signal.
+        signal: &'static str,
+        /// What it should have said.
+        slot: Slot<f64>,
     },
 }

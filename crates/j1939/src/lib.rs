@@ -7,6 +7,9 @@
 //! | `frame` | an identifier and up to eight bytes | SAE J1939-21, 5.1 |
 //! | `wire` | how long a frame takes, how busy a bus is | ISO 11898-1 |
 //! | `bus` | the trait of a bus; buses in memory, of logs, of the kernel, over TCP | |
+//! | `slot` | a number, or why there is none | SAE J1939-71, 5.1.5 |
+//! | `check` | counters and checksums of TSC1, XBR, AEBS2 and SAS | SAE J1939-71 |
+//! | `signal`, `message` | typed messages and the table of their signals | SAE J1939-71 and J1939DA |
 //!
 //! The core needs neither an allocator nor an operating system (`no_std`); the features `alloc` and
 //! `std` add owned buffers and the buses. Nothing that comes from a bus can panic here: what cannot
@@ -14,12 +17,19 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 
 pub mod bus;
+pub mod check;
 mod error;
 mod frame;
 mod id;
+pub mod message;
+mod signal;
+mod slot;
 mod wire;
 
 pub use error::J1939Error;
 pub use frame::Frame;
 pub use id::{GLOBAL_ADDRESS, Id, NULL_ADDRESS, PGN_MAX};
+pub use message::{Message, MessageTable};
+pub use signal::Signal;
+pub use slot::Slot;
 pub use wire::{BitRate, BusLoad, frame_bits};
