@@ -82,16 +82,16 @@ impl Carrier {
 
 /// A message with counter and checksum in byte 8.
 pub trait Protected: Message<Bytes = [u8; 8]> + Copy {
-    /// The message with this counter and checksum.
+    /// The message with some counter and checksum: without, it does not encode.
     #[must_use]
-    fn protected(self, counter: u8, checksum: u8) -> Self;
+    fn protectable(self) -> Self;
 }
 
 macro_rules! protected {
     ($($message:ident),*) => {$(
         impl Protected for $message {
-            fn protected(self, counter: u8, checksum: u8) -> Self {
-                Self { counter: Slot::Value(counter), checksum: Slot::Value(checksum), ..self }
+            fn protectable(self) -> Self {
+                Self { counter: Slot::Value(0), checksum: Slot::Value(0), ..self }
             }
         }
     )*};
@@ -118,10 +118,24 @@ impl Sealer {
     /// # Errors
     /// As [`Message::encode`] and [`Id::new`].
     pub fn seal<M: Protected>(&mut self, message: M, da: u8, sa: u8) -> Result<Frame, J1939Error> {
+        self.seal_bytes(message.protectable().encode()?, da, sa)
+    }
+
+    /// The frame of these bytes, the last one replaced.
+    pub(crate) fn seal_bytes(
+        &mut self,
+        data: [u8; 8],
+        da: u8,
+        sa: u8,
+    ) -> Result<Frame, J1939Error> {
         let Carrier { pgn, priority, protection } = self.carrier;
         let id = Id::new(priority, pgn, da, sa)?;
-        let checksum = protection.checksum(id, message.protected(self.counter, 0).encode()?);
-        let data = message.protected(self.counter, checksum).encode()?;
+        let mut data = data;
+        let [.., signature] = &mut data;
+        *signature = self.counter;
+        let checksum = protection.checksum(id, data);
+        let [.., signature] = &mut data;
+        *signature = checksum << 4 | self.counter;
         self.counter = (self.counter + 1) % protection.counter_modulus.max(1);
         Ok(Frame::of(id, data))
     }

@@ -1,6 +1,6 @@
 //! Errors of the J1939 core.
 
-use crate::Slot;
+use crate::{Slot, check::Verdict};
 
 /// What a caller or a bus can get wrong.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -49,5 +49,55 @@ pub enum J1939Error {
         signal: &'static str,
         /// What it should have said.
         slot: Slot<f64>,
+    },
+    /// A trouble code that does not fit into its bits.
+    #[error(
+        "PGN {pgn}: trouble code {spn}/{fmi} does not fit: 19 bits, 5 bits, up to 126 occurrences"
+    )]
+    Dtc {
+        /// The parameter group.
+        pgn: u32,
+        /// Its suspect parameter number.
+        spn: u32,
+        /// Its failure mode.
+        fmi: u8,
+    },
+    /// A message does not fit into the caller's buffer.
+    #[error("PGN {pgn} needs {need} bytes, the buffer has {len}")]
+    Buffer {
+        /// The parameter group.
+        pgn: u32,
+        /// Bytes of the buffer.
+        len: usize,
+        /// Bytes of the message.
+        need: usize,
+    },
+    /// A field of text is no printable ASCII.
+    #[error("PGN {pgn} of {sa:#04X}: a field is no printable ASCII")]
+    Text {
+        /// The parameter group.
+        pgn: u32,
+        /// Who sent it.
+        sa: u8,
+    },
+    /// A demand whose counter or checksum does not let it act.
+    #[error("PGN {pgn} from {sa:#04X} must not act: {verdict:?}")]
+    Unprotected {
+        /// The parameter group.
+        pgn: u32,
+        /// Who sent it.
+        sa: u8,
+        /// What was found.
+        verdict: Verdict,
+    },
+    /// A signal that is needed carries no number.
+    #[error("PGN {pgn} from {sa:#04X}: {signal} has no value")]
+    NoValue {
+        /// The parameter group.
+        pgn: u32,
+        /// Who sent it.
+        sa: u8,
+        /// The signal.
+        signal: &'static str,
     },
 }

@@ -9,6 +9,9 @@
 //! | `bus` | the trait of a bus; buses in memory, of logs, of the kernel, over TCP | |
 //! | `slot` | a number, or why there is none | SAE J1939-71, 5.1.5 |
 //! | `check` | counters and checksums of TSC1, XBR, AEBS2 and SAS | SAE J1939-71 |
+//! | `dm` | trouble codes: DM1, DM2 | SAE J1939-73 |
+//! | `ident` | text: VI, CI, SOFT | SAE J1939-71 |
+//! | `steering` | the place for a maker's steering frame, and an example | none |
 //! | `signal`, `message` | typed messages and the table of their signals | SAE J1939-71 and J1939DA |
 //!
 //! The core needs neither an allocator nor an operating system (`no_std`); the features `alloc` and
@@ -18,12 +21,15 @@
 
 pub mod bus;
 pub mod check;
+pub mod dm;
 mod error;
 mod frame;
 mod id;
+pub mod ident;
 pub mod message;
 mod signal;
 mod slot;
+pub mod steering;
 mod wire;
 
 pub use error::J1939Error;
