@@ -50,16 +50,21 @@ impl Command {
     /// # Errors
     /// [`CoreError::NonFinite`] names the field.
     pub fn check_finite(&self) -> Result<(), CoreError> {
-        for (field, value) in [
+        crate::error::finite(self.numbers())
+    }
+
+    /// Whether every number is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.numbers().iter().all(|(_, value)| value.is_finite())
+    }
+
+    fn numbers(&self) -> [(&'static str, f64); 4] {
+        [
             ("accelerator_pedal_frac", self.accelerator_pedal_frac),
             ("xbr_decel_m_s2", self.xbr_decel_m_s2),
             ("steering_wheel_rad", self.steering_wheel_rad),
             ("retarder_frac", self.retarder_frac),
-        ] {
-            if !value.is_finite() {
-                return Err(CoreError::NonFinite { field, value });
-            }
-        }
-        Ok(())
+        ]
     }
 }

@@ -86,8 +86,18 @@ impl EgoState {
     /// # Errors
     /// [`CoreError::NonFinite`] names the first offending field.
     pub fn check_finite(&self) -> Result<(), CoreError> {
+        crate::error::finite(self.numbers())
+    }
+
+    /// Whether every number is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.numbers().iter().all(|(_, value)| value.is_finite())
+    }
+
+    fn numbers(&self) -> [(&'static str, f64); 26] {
         let p = &self.powertrain;
-        for (field, value) in [
+        [
             ("x_m", self.x_m),
             ("y_m", self.y_m),
             ("z_m", self.z_m),
@@ -114,11 +124,6 @@ impl EgoState {
             ("powertrain.fuel_rate_g_s", p.fuel_rate_g_s),
             ("powertrain.fuel_used_g", p.fuel_used_g),
             ("powertrain.engine_power_w", p.engine_power_w),
-        ] {
-            if !value.is_finite() {
-                return Err(CoreError::NonFinite { field, value });
-            }
-        }
-        Ok(())
+        ]
     }
 }

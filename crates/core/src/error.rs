@@ -35,3 +35,15 @@ pub enum CoreError {
         why: String,
     },
 }
+
+/// Checks that named numbers are finite.
+pub(crate) fn finite(
+    numbers: impl IntoIterator<Item = (&'static str, f64)>,
+) -> Result<(), CoreError> {
+    for (field, value) in numbers {
+        if !value.is_finite() {
+            return Err(CoreError::NonFinite { field, value });
+        }
+    }
+    Ok(())
+}

@@ -23,6 +23,7 @@ mod provenance;
 pub mod road_load;
 mod scene;
 mod seams;
+mod status;
 mod table;
 mod time;
 #[cfg(feature = "std")]
@@ -41,6 +42,7 @@ pub use provenance::Provenance;
 pub use road_load::{RoadLoad, RoadPiece, Wind};
 pub use scene::{Neighbour, Scene, VehicleClass};
 pub use seams::{Recorder, Stamped, Tick, TrafficSource, Vehicle};
+pub use status::{ActiveFault, SafetySignal, VehicleFault, VehicleStatus};
 pub use table::{Curve, Grid};
 pub use time::Time;
 

@@ -95,6 +95,29 @@ pub enum GuardReason {
     Headway,
     /// The planner returned no plan.
     NoPlan,
+    /// The truck or its bus is not in order: a lost signal, wrong counters, the bus gone or flooded.
+    Bus,
+    /// Somebody on the bus pretends to be somebody else.
+    Intruder,
+    /// The driver has taken over; nothing is asked of the truck.
+    Driver,
+}
+
+impl GuardReason {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::Range,
+        Self::Rate,
+        Self::Stale,
+        Self::NonFinite,
+        Self::Frozen,
+        Self::Jump,
+        Self::Headway,
+        Self::NoPlan,
+        Self::Bus,
+        Self::Intruder,
+        Self::Driver,
+    ];
 }
 
 /// A point of the planned path.
@@ -162,6 +185,6 @@ pub struct Plan {
     pub held_up: bool,
     /// The guarded command.
     pub command: Command,
-    /// What the guard changed, in order of detection.
+    /// What the guard changed, in the order of [`GuardReason::ALL`].
     pub guard: Vec<GuardReason>,
 }

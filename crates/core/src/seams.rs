@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Command, EgoState, Plan, Scene, Time, VehicleLimits};
+use crate::{Command, EgoState, Plan, Scene, Time, VehicleLimits, VehicleStatus};
 
 /// A value and the time at which it was true.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -29,6 +29,11 @@ pub trait Vehicle {
     fn command(&mut self, now: Time, command: &Command) -> Result<(), Self::Error>;
     /// What the truck can do, as far as it is known now (mass estimate included).
     fn limits(&self) -> &VehicleLimits;
+    /// What is wrong with the truck as of the last [`Self::ego`], and how old its signals are. A
+    /// truck that is simulated directly is in order.
+    fn status(&self) -> VehicleStatus {
+        VehicleStatus::default()
+    }
 }
 
 /// Where the other vehicles come from.

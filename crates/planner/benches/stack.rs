@@ -13,7 +13,9 @@ use planner::safety::{Gate, GateView, RssConfig};
 use planner::steering::{LaneChangeConfig, LateralPath, Start, plan_change};
 use planner::{DeciderKind, LaneChoice, Stack, StackConfig};
 use road::{Road, builtin};
-use tractrix_core::{EgoState, Neighbour, PowertrainSignals, Scene, Stamped, Time, VehicleClass};
+use tractrix_core::{
+    EgoState, Neighbour, PowertrainSignals, Scene, Stamped, Time, VehicleClass, VehicleStatus,
+};
 
 fn ego(road: &Road, s_m: f64) -> EgoState {
     let d_m = road.lanes()[0].center_d_m(s_m);
@@ -103,7 +105,11 @@ fn tick(c: &mut Criterion) {
                 ego.s_m += 1e-6 * (now.0 / 10_000_000 % 2) as f64;
                 stack.request_lane_change(LaneChoice::Left);
                 let ego = Stamped { time: now, value: ego };
-                black_box(stack.tick(now, &ego, &scene, &road, &limits).command)
+                black_box(
+                    stack
+                        .tick(now, &ego, &VehicleStatus::default(), &scene, &road, &limits)
+                        .command,
+                )
             });
         });
         assert!(stack.plan().guard.is_empty(), "{:?}", stack.plan().guard);

@@ -30,7 +30,7 @@ pub enum DriveError<V: core::error::Error, T: core::error::Error> {
     Command(V),
 }
 
-/// Drives one tick: ego, scene, plan, command, record.
+/// Drives one tick: ego, status, scene, plan, command, record.
 ///
 /// # Errors
 /// [`DriveError`] when a seam fails. When the truck cannot be read or the traffic source fails, the
@@ -47,22 +47,23 @@ pub fn drive_tick<V: Vehicle, T: TrafficSource, R: Recorder>(
     let ego = match vehicle.ego(now) {
         Ok(ego) => ego,
         Err(error) => {
-            let plan = stack.minimal_risk(now, None, road, vehicle.limits());
+            let plan = stack.minimal_risk(now, None, &vehicle.status(), road, vehicle.limits());
             let command = plan.command;
             vehicle.command(now, &command).map_err(DriveError::Command)?;
             return Err(DriveError::Ego(error));
         }
     };
+    let status = vehicle.status();
     let scene = match traffic.advance(now, &ego.value) {
         Ok(scene) => scene,
         Err(error) => {
-            let plan = stack.minimal_risk(now, Some(&ego), road, vehicle.limits());
+            let plan = stack.minimal_risk(now, Some(&ego), &status, road, vehicle.limits());
             let command = plan.command;
             vehicle.command(now, &command).map_err(DriveError::Command)?;
             return Err(DriveError::Traffic(error));
         }
     };
-    let plan = stack.tick(now, &ego, scene, road, vehicle.limits());
+    let plan = stack.tick(now, &ego, &status, scene, road, vehicle.limits());
     vehicle.command(now, &plan.command).map_err(DriveError::Command)?;
     recorder.record(&Tick { now, ego: &ego.value, scene, plan });
     Ok(TickOutcome { ego, maneuver: plan.maneuver, guarded: !plan.guard.is_empty() })

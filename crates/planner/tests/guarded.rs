@@ -9,8 +9,8 @@ use road::{Road, builtin};
 use support::data_sheet::reference_limits;
 use support::{Plant, no_traffic};
 use tractrix_core::{
-    BrakeMode, Command, EgoState, GuardReason, Maneuver, Neighbour, Scene, Stamped, Time,
-    TrafficSource, Vehicle, VehicleLimits,
+    BrakeMode, Command, EgoState, GuardReason, Maneuver, Neighbour, SafetySignal, Scene, Stamped,
+    Time, TrafficSource, Vehicle, VehicleFault, VehicleLimits, VehicleStatus,
 };
 
 fn tick(i: i64) -> Time {
@@ -20,7 +20,7 @@ fn tick(i: i64) -> Time {
 /// Drives 5 s in order, then `seconds` with `spoil` applied to what the stack is told.
 fn spoilt(
     seconds: f64,
-    mut spoil: impl FnMut(i64, &mut Stamped<EgoState>, &mut Scene),
+    mut spoil: impl FnMut(i64, &mut Stamped<EgoState>, &mut Scene, &mut VehicleStatus),
     mut look: impl FnMut(f64, &Stack, &EgoState),
 ) {
     let road = builtin::flat(5_000.0);
@@ -33,10 +33,11 @@ fn spoilt(
         let now = tick(i);
         let mut ego = plant.ego(now).unwrap();
         let mut scene = Scene { time: now, neighbours: Vec::new() };
+        let mut status = VehicleStatus::default();
         if i >= 500 {
-            spoil(i, &mut ego, &mut scene);
+            spoil(i, &mut ego, &mut scene, &mut status);
         }
-        let command = stack.tick(now, &ego, &scene, &road, &limits).command;
+        let command = stack.tick(now, &ego, &status, &scene, &road, &limits).command;
         command.check_finite().unwrap();
         plant.command(now, &command).unwrap();
         if i < 500 {
@@ -67,7 +68,7 @@ fn a_state_that_is_not_a_number_brings_the_truck_to_rest_in_its_lane() {
     let mut check = brakes_in_lane(GuardReason::NonFinite);
     spoilt(
         14.0,
-        |_, ego, _| ego.value.yaw_rate_rad_s = f64::NAN,
+        |_, ego, _, _| ego.value.yaw_rate_rad_s = f64::NAN,
         |t, stack, truth| {
             check(t, stack, truth);
             at_end = truth.speed_m_s;
@@ -82,7 +83,7 @@ fn a_state_that_is_no_longer_renewed_is_stale() {
     let mut check = brakes_in_lane(GuardReason::Stale);
     spoilt(
         3.0,
-        move |_, ego, _| *ego = *kept.get_or_insert(*ego),
+        move |_, ego, _, _| *ego = *kept.get_or_insert(*ego),
         |t, stack, truth| {
             if t > 0.2 {
                 check(t, stack, truth);
@@ -97,7 +98,7 @@ fn a_state_that_is_renewed_in_its_stamp_alone_is_frozen() {
     let mut check = brakes_in_lane(GuardReason::Frozen);
     spoilt(
         3.0,
-        move |_, ego, _| ego.value = *kept.get_or_insert(ego.value),
+        move |_, ego, _, _| ego.value = *kept.get_or_insert(ego.value),
         |t, stack, truth| {
             if t > 0.35 {
                 check(t, stack, truth);
@@ -111,7 +112,7 @@ fn a_jump_is_answered_by_braking_and_forgotten_once_the_position_is_steady_again
     let mut seen = false;
     spoilt(
         3.0,
-        |_, ego, _| ego.value.s_m += 40.0,
+        |_, ego, _, _| ego.value.s_m += 40.0,
         |t, stack, _| {
             let plan = stack.plan();
             seen |= plan.guard.contains(&GuardReason::Jump);
@@ -127,11 +128,97 @@ fn without_a_fresh_scene_the_truck_brakes_but_goes_on_steering() {
     let mut check = brakes_in_lane(GuardReason::Stale);
     spoilt(
         3.0,
-        |_, _, scene| scene.time = tick(500),
+        |_, _, scene, _| scene.time = tick(500),
         |t, stack, truth| {
             if t > 0.55 {
                 check(t, stack, truth);
                 assert!(stack.plan().lateral_error_m.abs() < 0.05);
+            }
+        },
+    );
+}
+
+#[test]
+fn with_a_silent_engine_the_truck_stops_and_is_steered_as_before() {
+    let mut at_end = 99.0;
+    let mut check = brakes_in_lane(GuardReason::Bus);
+    spoilt(
+        14.0,
+        |_, _, _, status| {
+            status.raise(VehicleFault::SignalLost, tick(500));
+            status.set_age_s(SafetySignal::Engine, f64::INFINITY);
+        },
+        |t, stack, truth| {
+            check(t, stack, truth);
+            assert_eq!(stack.plan().guard, [GuardReason::Bus], "steering is in order");
+            assert!(stack.plan().lateral_error_m.abs() < 0.05);
+            at_end = truth.speed_m_s;
+        },
+    );
+    assert!(at_end < 0.1, "{at_end} m/s");
+}
+
+#[test]
+fn an_old_signal_that_steers_makes_the_state_stale() {
+    let mut check = brakes_in_lane(GuardReason::Stale);
+    spoilt(
+        2.0,
+        |i, _, _, status| {
+            let age_s = (i - 500) as f64 * 0.01;
+            status.set_age_s(SafetySignal::SteeringAngle, age_s);
+            status.set_age_s(SafetySignal::Pedals, 10.0 * age_s);
+        },
+        |t, stack, truth| {
+            if t > 0.155 {
+                check(t, stack, truth);
+            } else {
+                assert!(stack.plan().guard.is_empty(), "at {t}");
+            }
+        },
+    );
+}
+
+#[test]
+fn an_intruder_is_answered_in_the_same_tick_and_the_truck_goes_on_when_he_has_gone() {
+    spoilt(
+        2.0,
+        |i, _, _, status| {
+            if i < 550 {
+                status.raise(VehicleFault::Spoofed, tick(i));
+                status.raise(VehicleFault::Flooded, tick(i));
+            }
+        },
+        |t, stack, _| {
+            let (now, plan) = ((100.0 * t).round() as i64, stack.plan());
+            let wrong = [GuardReason::Bus, GuardReason::Intruder];
+            assert_eq!(plan.guard, if now < 50 { &wrong[..] } else { &[] }, "at {t}");
+            assert_eq!(plan.maneuver == Maneuver::MinimalRisk, now < 99, "at {t}");
+        },
+    );
+}
+
+#[test]
+fn nothing_is_asked_of_a_truck_that_the_driver_has_taken() {
+    spoilt(
+        3.0,
+        |i, ego, _, status| {
+            if i < 600 {
+                status.raise(VehicleFault::DriverOverride, tick(500));
+                ego.value.steering_wheel_rad = 0.02;
+            }
+            if i < 550 {
+                status.raise(VehicleFault::SignalLost, tick(500));
+            }
+        },
+        |t, stack, _| {
+            let plan = stack.plan();
+            assert_ne!(plan.maneuver, Maneuver::MinimalRisk, "at {t}");
+            if t < 0.995 {
+                let held = Command { steering_wheel_rad: 0.02, ..Command::default() };
+                assert_eq!(plan.command, held, "at {t}");
+                assert!(plan.guard.contains(&GuardReason::Driver));
+            } else {
+                assert!(plan.guard.is_empty(), "{:?} at {t}", plan.guard);
             }
         },
     );
@@ -226,7 +313,14 @@ proptest! {
     fn whatever_comes_in_the_command_is_finite_and_in_range(
         numbers in prop::collection::vec(any_number(), 24),
         stamps in prop::collection::vec(-2_000_000_000_i64..2_000_000_000, 2),
+        faults in prop::collection::vec(prop::sample::select(&VehicleFault::ALL), 0..3),
+        age_s in any_number(),
     ) {
+        let mut status = VehicleStatus::default();
+        for fault in faults {
+            status.raise(fault, Time(stamps[0]));
+        }
+        status.set_age_s(SafetySignal::YawRate, age_s);
         let road = builtin::highway();
         let limits = reference_limits();
         let mut stack = Stack::new(StackConfig::default(), &limits).unwrap();
@@ -255,7 +349,7 @@ proptest! {
                 time: Time(now.0 + stamps[1] / 4),
                 neighbours: vec![neighbour],
             };
-            let c = stack.tick(now, &ego, &scene, &road, &limits).command;
+            let c = stack.tick(now, &ego, &status, &scene, &road, &limits).command;
             prop_assert!(c.check_finite().is_ok());
             prop_assert!((0.0..=1.0).contains(&c.accelerator_pedal_frac));
             prop_assert!((0.0..=1.0).contains(&c.retarder_frac));

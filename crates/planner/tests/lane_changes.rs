@@ -8,7 +8,7 @@ use road::{Road, builtin};
 use support::data_sheet::reference_limits;
 use support::{Misfit, Plant, no_traffic};
 use tractrix_core::{
-    LaneChangeReason, LaneChangeRefusal, Maneuver, Neighbour, Scene, Time, Vehicle,
+    LaneChangeReason, LaneChangeRefusal, Maneuver, Neighbour, Scene, Time, Vehicle, VehicleStatus,
 };
 
 fn tick(i: i64) -> Time {
@@ -132,7 +132,14 @@ fn first_reasoned(decider: DeciderKind, wish: LaneChoice, slow: bool) -> tractri
         let ego = plant.ego(tick(i)).unwrap();
         let neighbours = if slow { vec![truck] } else { Vec::new() };
         let scene = Scene { time: tick(i), neighbours };
-        let plan = stack.tick(tick(i), &ego, &scene, &road, &reference_limits());
+        let plan = stack.tick(
+            tick(i),
+            &ego,
+            &VehicleStatus::default(),
+            &scene,
+            &road,
+            &reference_limits(),
+        );
         if plan.reason.is_some() {
             return plan.clone();
         }

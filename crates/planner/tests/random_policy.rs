@@ -12,7 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use road::builtin;
 use support::data_sheet::reference_limits;
 use support::traffic::{Cars, EgoBody};
-use tractrix_core::{EgoState, LaneChangeRefusal, Maneuver, Scene, Stamped, Time};
+use tractrix_core::{EgoState, LaneChangeRefusal, Maneuver, Scene, Stamped, Time, VehicleStatus};
 
 const TICK_S: f64 = 0.05;
 
@@ -67,7 +67,14 @@ fn drive(seed: u64, decisions: u64, density: f64, config: &StackConfig, tally: &
         let now = Time::from_seconds(i as f64 * TICK_S);
         scene.time = now;
         scene.neighbours = cars.neighbours();
-        let plan = stack.tick(now, &Stamped { time: now, value: ego }, &scene, &road, &limits);
+        let plan = stack.tick(
+            now,
+            &Stamped { time: now, value: ego },
+            &VehicleStatus::default(),
+            &scene,
+            &road,
+            &limits,
+        );
         if plan.maneuver != before {
             let change = [Maneuver::ChangeLeft, Maneuver::ChangeRight];
             tally.changes += u64::from(change.contains(&plan.maneuver));

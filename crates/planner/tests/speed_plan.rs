@@ -14,7 +14,8 @@ use road::{ProfilePoint, builtin};
 use support::data_sheet::reference_limits;
 use support::{Plant, Scripted, no_traffic};
 use tractrix_core::{
-    EgoState, GearRequest, Neighbour, PlanStatus, Scene, Stamped, Time, VehicleClass, VehicleLimits,
+    EgoState, GearRequest, Neighbour, PlanStatus, Scene, Stamped, Time, VehicleClass,
+    VehicleLimits, VehicleStatus,
 };
 
 /// Sinusoidal hills: slope amplitude, wave length in m, phase in rad.
@@ -243,7 +244,7 @@ fn when_planning_breaks_down_the_last_profile_is_driven_to_its_end_and_cruise_go
         };
         let told = if i < 1_000 { &limits } else { &broken };
         let scene = Scene { time: now, ..Scene::default() };
-        let command = stack.tick(now, &ego, &scene, &road, told).command;
+        let command = stack.tick(now, &ego, &VehicleStatus::default(), &scene, &road, told).command;
         tractrix_core::Vehicle::command(&mut plant, now, &command).unwrap();
         is_calm(&stack);
         let status = stack.plan().speed_status;

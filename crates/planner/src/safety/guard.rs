@@ -3,17 +3,49 @@
 //! [`inspect`] looks at what came in (finite, in range, fresh, moving, not jumping), [`limit`] at
 //! what goes out (finite, in range, not too fast, not into the vehicle ahead). Whatever is wrong
 //! with the inputs leads to the minimal-risk manoeuvre: keep the lane, accelerator off, brake with
-//! a bounded deceleration, until the inputs have been in order for a while. Every activation names
-//! its [`GuardReason`].
-
-use alloc::vec::Vec;
+//! a bounded deceleration, until the inputs have been in order for a while. A driver who takes over
+//! gets the truck: nothing is asked of it. Every activation names its [`GuardReason`].
+//!
+//! Neither function allocates or can panic.
 
 use crate::PlannerError;
 use crate::error::config_in;
 use serde::{Deserialize, Serialize};
 use tractrix_core::{
-    BrakeMode, Command, EgoState, GearRequest, GuardReason, Stamped, Time, VehicleLimits,
+    BrakeMode, Command, EgoState, GearRequest, GuardReason, SafetySignal, Stamped, Time,
+    VehicleFault, VehicleLimits, VehicleStatus,
 };
+
+/// A set of reasons.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Reasons(u16);
+
+const _: () = assert!(GuardReason::ALL.len() <= u16::BITS as usize);
+
+impl Reasons {
+    fn insert(&mut self, reason: GuardReason) {
+        self.0 |= 1 << reason as u16;
+    }
+
+    fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+
+    /// Whether the reason is in the set.
+    pub(crate) fn contains(self, reason: GuardReason) -> bool {
+        self.0 & (1 << reason as u16) != 0
+    }
+
+    /// What is in this set or in the other.
+    pub(crate) fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The reasons, in the order of [`GuardReason::ALL`].
+    pub(crate) fn iter(self) -> impl Iterator<Item = GuardReason> {
+        GuardReason::ALL.into_iter().filter(move |&reason| self.contains(reason))
+    }
+}
 
 /// Bounds of the guard.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -99,41 +131,49 @@ impl GuardMemory {
 }
 
 /// Verdict on the inputs.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Inspection {
     /// The ego state can be steered with.
     pub ego_usable: bool,
     /// The inputs, or those of a moment ago, call for the minimal-risk manoeuvre.
     pub minimal_risk: bool,
-    /// What is wrong now, in order of detection.
-    pub reasons: Vec<GuardReason>,
+    /// The driver has taken over.
+    pub driver: bool,
+    /// What is wrong now.
+    pub reasons: Reasons,
 }
 
 /// Looks at the inputs of a tick. `ego` and `scene_time` are `None` when their seam failed.
+///
+/// A truck whose engine, gearbox or brakes are silent can still be steered to its stop: only the
+/// signals that steer make the ego state unusable.
 #[must_use]
 pub(crate) fn inspect(
     config: &GuardConfig,
     memory: &GuardMemory,
     now: Time,
     ego: Option<&Stamped<EgoState>>,
+    status: &VehicleStatus,
     scene_time: Option<Time>,
 ) -> (Inspection, GuardMemory) {
     let mut next = *memory;
-    let mut reasons = Vec::new();
+    let mut reasons = Reasons::default();
     match ego {
-        None => reasons.push(GuardReason::Stale),
-        Some(ego) if ego.value.check_finite().is_err() => reasons.push(GuardReason::NonFinite),
+        None => reasons.insert(GuardReason::Stale),
+        Some(ego) if !ego.value.is_finite() => reasons.insert(GuardReason::NonFinite),
         Some(ego) => {
             let age_s = now.seconds_since(ego.time);
-            if age_s > config.ego_age_max_s || age_s < -config.ego_age_max_s {
-                reasons.push(GuardReason::Stale);
+            let too_old = |age_s: f64| age_s > config.ego_age_max_s;
+            let steering = SafetySignal::ALL.into_iter().filter(|signal| signal.steers());
+            if too_old(age_s.abs()) || steering.filter_map(|s| status.age_s(s)).any(too_old) {
+                reasons.insert(GuardReason::Stale);
             }
             if !in_range(&ego.value) {
-                reasons.push(GuardReason::Range);
+                reasons.insert(GuardReason::Range);
             }
             if let Some(last) = &memory.last {
                 if jumped(config, last, ego) {
-                    reasons.push(GuardReason::Jump);
+                    reasons.insert(GuardReason::Jump);
                 }
                 let v = &ego.value;
                 let same = v.s_m == last.value.s_m && v.x_m == last.value.x_m;
@@ -141,7 +181,7 @@ pub(crate) fn inspect(
                 if !same || v.speed_m_s.abs() < 0.5 {
                     next.moved = Some(now);
                 } else if now.seconds_since(since) > config.frozen_max_s {
-                    reasons.push(GuardReason::Frozen);
+                    reasons.insert(GuardReason::Frozen);
                 }
             } else {
                 next.moved = Some(now);
@@ -151,20 +191,38 @@ pub(crate) fn inspect(
     }
     let ego_usable = reasons.is_empty();
     match scene_time {
-        None => reasons.push(GuardReason::Stale),
+        None => reasons.insert(GuardReason::Stale),
         Some(t) if now.seconds_since(t).abs() > config.scene_age_max_s => {
-            if !reasons.contains(&GuardReason::Stale) {
-                reasons.push(GuardReason::Stale);
-            }
+            reasons.insert(GuardReason::Stale);
         }
         Some(_) => {}
     }
-    if !reasons.is_empty() {
+    for fault in status.faults() {
+        reasons.insert(reason_of(fault.fault));
+    }
+    let driver = reasons.contains(GuardReason::Driver);
+    let wrong = reasons.iter().any(|reason| reason != GuardReason::Driver);
+    if wrong {
         next.wrong = Some(now);
     }
-    let minimal_risk =
-        next.wrong.is_some_and(|t| !reasons.is_empty() || now.seconds_since(t) < config.recovery_s);
-    (Inspection { ego_usable, minimal_risk, reasons }, next)
+    let recovering = |t| now.seconds_since(t) < config.recovery_s;
+    let minimal_risk = !driver && (wrong || next.wrong.is_some_and(recovering));
+    (Inspection { ego_usable, minimal_risk, driver, reasons }, next)
+}
+
+/// What a fault of the truck means to the guard.
+fn reason_of(fault: VehicleFault) -> GuardReason {
+    match fault {
+        VehicleFault::DriverOverride => GuardReason::Driver,
+        VehicleFault::Spoofed | VehicleFault::AddressConflict => GuardReason::Intruder,
+        VehicleFault::SignalLost
+        | VehicleFault::CounterJump
+        | VehicleFault::Checksum
+        | VehicleFault::RateViolation
+        | VehicleFault::BusOff
+        | VehicleFault::Flooded
+        | VehicleFault::NotReady => GuardReason::Bus,
+    }
 }
 
 /// Ranges that no truck leaves.
@@ -221,17 +279,19 @@ pub(crate) struct GuardInput {
     pub keep_lane_wheel_rad: f64,
     /// The inputs call for the minimal-risk manoeuvre.
     pub minimal_risk: bool,
+    /// The driver has taken over; the hand wheel as it stands, rad.
+    pub driver_wheel_rad: Option<f64>,
     /// The vehicle ahead.
     pub headway: Option<Headway>,
 }
 
 /// The guarded command.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Guarded {
     /// The command to send.
     pub command: Command,
-    /// What was changed and why, in order of detection.
-    pub reasons: Vec<GuardReason>,
+    /// What was changed and why.
+    pub reasons: Reasons,
     /// The minimal-risk manoeuvre is being driven.
     pub minimal_risk: bool,
 }
@@ -244,16 +304,25 @@ pub(crate) fn limit(
     input: &GuardInput,
     limits: &VehicleLimits,
 ) -> (Guarded, GuardMemory) {
-    let mut reasons = Vec::new();
+    let mut reasons = Reasons::default();
+    if let Some(wheel_rad) = input.driver_wheel_rad {
+        let held = memory.sent.steering_wheel_rad;
+        let command = Command {
+            steering_wheel_rad: if wheel_rad.is_finite() { wheel_rad } else { held },
+            ..Command::default()
+        };
+        let next = GuardMemory { sent: command, ..*memory };
+        return (Guarded { command, reasons, minimal_risk: false }, next);
+    }
     let planned = match &input.planned {
         None => {
             if !input.minimal_risk {
-                reasons.push(GuardReason::NoPlan);
+                reasons.insert(GuardReason::NoPlan);
             }
             None
         }
-        Some(c) if c.check_finite().is_err() => {
-            reasons.push(GuardReason::NonFinite);
+        Some(c) if !c.is_finite() => {
+            reasons.insert(GuardReason::NonFinite);
             None
         }
         Some(c) => Some(*c),
@@ -264,14 +333,14 @@ pub(crate) fn limit(
         _ => minimal_risk_command(config, memory, input, planned.as_ref()),
     };
     if in_command_range(&mut command, config, input.speed_m_s, limits) {
-        reasons.push(GuardReason::Range);
+        reasons.insert(GuardReason::Range);
     }
     let step = config.wheel_rate_max_rad_s * input.dt_s;
     let from = memory.sent.steering_wheel_rad;
-    let slow = command.steering_wheel_rad.clamp(from - step, from + step);
+    let slow = within(command.steering_wheel_rad, from - step, from + step);
     if slow != command.steering_wheel_rad {
         command.steering_wheel_rad = slow;
-        reasons.push(GuardReason::Rate);
+        reasons.insert(GuardReason::Rate);
     }
     if let Some(decel_m_s2) = input.headway.and_then(|h| needs_braking(&h, input, limits)) {
         let already = command.xbr_decel_m_s2;
@@ -281,7 +350,7 @@ pub(crate) fn limit(
             command.xbr_decel_m_s2 = already.max(decel_m_s2);
             command.brake_mode = BrakeMode::Maximum;
             command.gear = GearRequest::Automatic;
-            reasons.push(GuardReason::Headway);
+            reasons.insert(GuardReason::Headway);
         }
     }
     let next = GuardMemory { sent: command, ..*memory };
@@ -308,6 +377,17 @@ fn minimal_risk_command(
     }
 }
 
+/// `f64::clamp` without its panic on bounds that are the wrong way round.
+fn within(value: f64, low: f64, high: f64) -> f64 {
+    if value < low {
+        low
+    } else if value > high {
+        high
+    } else {
+        value
+    }
+}
+
 /// Clamps every field into its range; true if something was outside.
 fn in_command_range(
     command: &mut Command,
@@ -327,10 +407,10 @@ fn in_command_range(
     } else {
         config.minimal_risk_decel_m_s2
     };
-    command.accelerator_pedal_frac = command.accelerator_pedal_frac.clamp(0.0, 1.0);
-    command.retarder_frac = command.retarder_frac.clamp(0.0, 1.0);
-    command.xbr_decel_m_s2 = command.xbr_decel_m_s2.clamp(0.0, hardest);
-    command.steering_wheel_rad = command.steering_wheel_rad.clamp(-wheel, wheel);
+    command.accelerator_pedal_frac = within(command.accelerator_pedal_frac, 0.0, 1.0);
+    command.retarder_frac = within(command.retarder_frac, 0.0, 1.0);
+    command.xbr_decel_m_s2 = within(command.xbr_decel_m_s2, 0.0, hardest);
+    command.steering_wheel_rad = within(command.steering_wheel_rad, -wheel, wheel);
     if command.xbr_decel_m_s2 > 0.0 && command.brake_mode == BrakeMode::Off {
         command.brake_mode = BrakeMode::Maximum;
     }

@@ -26,7 +26,7 @@ use crate::steering::{LateralController, ManeuverPlanner};
 use crate::{PlannerError, SpeedProfile};
 use road::Road;
 use speed::SpeedPlanning;
-use tractrix_core::{EgoState, Maneuver, Plan, Scene, Stamped, Time, VehicleLimits};
+use tractrix_core::{EgoState, Maneuver, Plan, Scene, Stamped, Time, VehicleLimits, VehicleStatus};
 
 /// The planning stack of one truck.
 #[derive(Debug, Clone)]
@@ -174,16 +174,17 @@ impl Stack {
     }
 
     /// One tick: the plan for `[now, next tick)`, its command guarded. Never fails: what is wrong
-    /// with the inputs is in the plan's guard reasons.
+    /// with the inputs or the truck is in the plan's guard reasons.
     pub fn tick(
         &mut self,
         now: Time,
         ego: &Stamped<EgoState>,
+        status: &VehicleStatus,
         scene: &Scene,
         road: &Road,
         limits: &VehicleLimits,
     ) -> &Plan {
-        self.run(now, Some(ego), Some(scene), road, limits)
+        self.run(now, Some(ego), status, Some(scene), road, limits)
     }
 
     /// One tick without a scene, or without ego state and scene, because a seam failed: the
@@ -192,16 +193,18 @@ impl Stack {
         &mut self,
         now: Time,
         ego: Option<&Stamped<EgoState>>,
+        status: &VehicleStatus,
         road: &Road,
         limits: &VehicleLimits,
     ) -> &Plan {
-        self.run(now, ego, None, road, limits)
+        self.run(now, ego, status, None, road, limits)
     }
 
     fn run(
         &mut self,
         now: Time,
         ego: Option<&Stamped<EgoState>>,
+        status: &VehicleStatus,
         scene: Option<&Scene>,
         road: &Road,
         limits: &VehicleLimits,
@@ -212,7 +215,7 @@ impl Stack {
             .clamp(0.0, 0.5);
         self.last_tick = Some(now);
         let (inspection, memory) =
-            inspect(&self.config.guard, &self.guard, now, ego, scene.map(|s| s.time));
+            inspect(&self.config.guard, &self.guard, now, ego, status, scene.map(|s| s.time));
         self.guard = memory;
         match ego {
             Some(ego) if inspection.ego_usable => self.believed = ego.value,
@@ -222,10 +225,8 @@ impl Stack {
         let empty = Scene::default();
         let scene = scene.unwrap_or(&empty);
 
-        self.plan.guard.clear();
-        self.plan.guard.extend_from_slice(&inspection.reasons);
         self.plan.refusal = None;
-        let planned = if inspection.ego_usable {
+        let planned = if inspection.ego_usable && !inspection.driver {
             self.estimate_load(dt_s, &ego, road, limits);
             let estimated = self.estimated.take();
             let known = estimated.as_ref().unwrap_or(limits);
@@ -245,18 +246,17 @@ impl Stack {
             planned,
             keep_lane_wheel_rad: steady * limits.lateral.steering_ratio,
             minimal_risk: inspection.minimal_risk,
+            driver_wheel_rad: inspection.driver.then_some(ego.steering_wheel_rad),
             headway: self.headway(&ego, scene, road, limits),
         };
         let (guarded, memory) = limit(&self.config.guard, &self.guard, &input, limits);
         self.guard = memory;
-        for reason in guarded.reasons {
-            if !self.plan.guard.contains(&reason) {
-                self.plan.guard.push(reason);
-            }
-        }
+        self.plan.guard.clear();
+        self.plan.guard.extend(inspection.reasons.union(guarded.reasons).iter());
         self.plan.command = guarded.command;
-        if guarded.minimal_risk {
-            self.plan.maneuver = Maneuver::MinimalRisk;
+        if guarded.minimal_risk || inspection.driver {
+            self.plan.maneuver =
+                if inspection.driver { Maneuver::KeepLane } else { Maneuver::MinimalRisk };
             self.lateral
                 .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);
         }

@@ -45,6 +45,9 @@ export const guard = from({
   jump: "an input jumped",
   headway: "the vehicle ahead is closer than the safe gap",
   no_plan: "there is no plan",
+  bus: "the truck or its bus is not in order",
+  intruder: "somebody on the bus pretends to be somebody else",
+  driver: "the driver has taken over",
 });
 
 const speedSource = from({
