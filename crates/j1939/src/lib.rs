@@ -13,6 +13,7 @@
 //! | `ident` | text: VI, CI, SOFT | SAE J1939-71 |
 //! | `steering` | the place for a maker's steering frame, and an example | none |
 //! | `signal`, `message` | typed messages and the table of their signals | SAE J1939-71 and J1939DA |
+//! | `dbc` | the table for tools that read CAN logs | |
 //!
 //! The core needs neither an allocator nor an operating system (`no_std`); the features `alloc` and
 //! `std` add owned buffers and the buses. Nothing that comes from a bus can panic here: what cannot
@@ -21,6 +22,7 @@
 
 pub mod bus;
 pub mod check;
+pub mod dbc;
 pub mod dm;
 mod error;
 mod frame;
