@@ -100,4 +100,25 @@ pub enum J1939Error {
         /// The signal.
         signal: &'static str,
     },
+    /// Only a node that has claimed an address may send.
+    #[error("no address is claimed, nothing may be sent")]
+    NoAddress,
+    /// A message that the transport cannot carry.
+    #[error("a message of PGN {pgn} cannot hold {len} bytes, it has 1 to {most}")]
+    MessageLength {
+        /// The parameter group.
+        pgn: u32,
+        /// Bytes asked for.
+        len: usize,
+        /// The most there may be, for this destination and memory.
+        most: usize,
+    },
+    /// A message to the same destination is under way, or no memory is free.
+    #[error("PGN {pgn} cannot go to {da:#04X} yet: a message is under way, or no session is free")]
+    TransportBusy {
+        /// The parameter group.
+        pgn: u32,
+        /// The destination.
+        da: u8,
+    },
 }

@@ -5,6 +5,9 @@
 //! |---|---|---|
 //! | `id` | priority, PGN, destination and source of a 29-bit identifier | SAE J1939-21, 5.2 |
 //! | `frame` | an identifier and up to eight bytes | SAE J1939-21, 5.1 |
+//! | `request` | requests for a group and their acknowledgment | SAE J1939-21, 5.4 |
+//! | `tp` | messages of more than eight bytes | SAE J1939-21, 5.10 |
+//! | `claim` | getting and keeping an address | SAE J1939-81 |
 //! | `wire` | how long a frame takes, how busy a bus is | ISO 11898-1 |
 //! | `bus` | the trait of a bus; buses in memory, of logs, of the kernel, over TCP | |
 //! | `slot` | a number, or why there is none | SAE J1939-71, 5.1.5 |
@@ -22,6 +25,7 @@
 
 pub mod bus;
 pub mod check;
+mod claim;
 pub mod dbc;
 pub mod dm;
 mod error;
@@ -29,15 +33,20 @@ mod frame;
 mod id;
 pub mod ident;
 pub mod message;
+mod request;
 mod signal;
 mod slot;
 pub mod steering;
+mod tp;
 mod wire;
 
+pub use claim::{ADDRESS_CLAIMED_PGN, AddressClaim, COMMANDED_ADDRESS_PGN, ClaimState, Name};
 pub use error::J1939Error;
 pub use frame::Frame;
 pub use id::{GLOBAL_ADDRESS, Id, NULL_ADDRESS, PGN_MAX};
 pub use message::{Message, MessageTable};
+pub use request::{ACKNOWLEDGMENT_PGN, Acknowledgment, Answer, REQUEST_PGN, Request};
 pub use signal::Signal;
 pub use slot::Slot;
+pub use tp::{AbortReason, TpCounts, TpEvent, TpMessage, Transport};
 pub use wire::{BitRate, BusLoad, frame_bits};
