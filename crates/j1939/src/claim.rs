@@ -10,7 +10,7 @@
 use tractrix_core::Time;
 
 use crate::bus::{Bus, BusError};
-use crate::{Frame, GLOBAL_ADDRESS, Id, NULL_ADDRESS, Request, TpMessage};
+use crate::{AddressSet, Frame, GLOBAL_ADDRESS, Id, NULL_ADDRESS, Request, TpMessage};
 
 /// Parameter group of a claim, and with the null address of "cannot claim".
 pub const ADDRESS_CLAIMED_PGN: u32 = 60_928;
@@ -98,7 +98,7 @@ pub struct AddressClaim {
     /// Somebody asked for our claim, or claimed our address in vain.
     answer_due: bool,
     /// Addresses that others have.
-    taken: [u64; 4],
+    taken: AddressSet,
 }
 
 impl AddressClaim {
@@ -114,7 +114,7 @@ impl AddressClaim {
             delay: delay_steps as i64 * DELAY_STEP,
             bypassed: false,
             answer_due: false,
-            taken: [0; 4],
+            taken: AddressSet::EMPTY,
         }
     }
 
@@ -209,7 +209,7 @@ impl AddressClaim {
         if sa >= NULL_ADDRESS || name == self.name {
             return;
         }
-        self.mark(sa);
+        self.taken.insert(sa);
         let holding = !matches!(self.state, ClaimState::Losing(_) | ClaimState::Lost);
         if sa != self.address || !holding {
             return;
@@ -218,7 +218,7 @@ impl AddressClaim {
             self.answer_due = true;
             return;
         }
-        let free = CHOICE.into_iter().find(|address| !self.is_taken(*address));
+        let free = CHOICE.into_iter().find(|address| !self.taken.contains(*address));
         match free.filter(|_| self.name.can_choose()) {
             Some(address) => (self.address, self.state) = (address, ClaimState::Announcing),
             None => self.state = ClaimState::Losing(now.plus_nanos(self.delay)),
@@ -237,16 +237,6 @@ impl AddressClaim {
             }
             _ => {}
         }
-    }
-
-    fn mark(&mut self, address: u8) {
-        if let Some(word) = self.taken.get_mut(usize::from(address / 64)) {
-            *word |= 1 << (address % 64);
-        }
-    }
-
-    fn is_taken(&self, address: u8) -> bool {
-        self.taken.get(usize::from(address / 64)).is_some_and(|w| w >> (address % 64) & 1 == 1)
     }
 }
 

@@ -8,6 +8,7 @@
 //! | `request` | requests for a group and their acknowledgment | SAE J1939-21, 5.4 |
 //! | `tp` | messages of more than eight bytes | SAE J1939-21, 5.10 |
 //! | `claim` | getting and keeping an address | SAE J1939-81 |
+//! | `supervise` | notices what is lost, spoofed, taken over, flooded | |
 //! | `wire` | how long a frame takes, how busy a bus is | ISO 11898-1 |
 //! | `bus` | the trait of a bus; buses in memory, of logs, of the kernel, over TCP | |
 //! | `slot` | a number, or why there is none | SAE J1939-71, 5.1.5 |
@@ -23,6 +24,7 @@
 //! be decoded is an error value with its PGN.
 #![cfg_attr(not(feature = "std"), no_std)]
 
+mod address_set;
 pub mod bus;
 pub mod check;
 mod claim;
@@ -37,9 +39,11 @@ mod request;
 mod signal;
 mod slot;
 pub mod steering;
+pub mod supervise;
 mod tp;
 mod wire;
 
+pub use address_set::AddressSet;
 pub use claim::{ADDRESS_CLAIMED_PGN, AddressClaim, COMMANDED_ADDRESS_PGN, ClaimState, Name};
 pub use error::J1939Error;
 pub use frame::Frame;

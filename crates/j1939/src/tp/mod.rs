@@ -25,7 +25,9 @@ pub use reason::AbortReason;
 use tractrix_core::Time;
 
 use crate::bus::{Bus, BusError};
-use crate::{ADDRESS_CLAIMED_PGN, Frame, GLOBAL_ADDRESS, Id, J1939Error, NULL_ADDRESS};
+use crate::{
+    ADDRESS_CLAIMED_PGN, AddressSet, Frame, GLOBAL_ADDRESS, Id, J1939Error, NULL_ADDRESS, Name,
+};
 use control::{Control, Protocol, What};
 use session::{Outcome, Session, Stage, answer};
 
@@ -120,7 +122,7 @@ pub struct Transport<const SESSIONS: usize, const BYTES: usize> {
     held: bool,
     sessions: [Session<BYTES>; SESSIONS],
     /// Which addresses somebody has claimed.
-    claimed: [u64; 4],
+    claimed: AddressSet,
     refusals: [Option<Frame>; REFUSALS],
     counts: TpCounts,
 }
@@ -145,7 +147,7 @@ impl<const SESSIONS: usize, const BYTES: usize> Transport<SESSIONS, BYTES> {
             window,
             held: false,
             sessions: [const { Session::free() }; SESSIONS],
-            claimed: [0; 4],
+            claimed: AddressSet::EMPTY,
             refusals: [None; REFUSALS],
             counts: TpCounts { refused: 0, malformed: 0 },
         }
@@ -225,7 +227,11 @@ impl<const SESSIONS: usize, const BYTES: usize> Transport<SESSIONS, BYTES> {
     pub fn on_frame(&mut self, now: Time, frame: &Frame) {
         let id = frame.id();
         if id.pgn() == ADDRESS_CLAIMED_PGN {
-            return self.note_claim(frame);
+            // a NAME of zero is nobody's
+            if Name::claimed_in(frame).is_some_and(|name| name.0 != 0) {
+                self.claimed.insert(id.sa());
+            }
+            return;
         }
         // who has no address has no sessions, and what comes from our own address is another's
         if id.sa() >= NULL_ADDRESS
@@ -305,24 +311,11 @@ impl<const SESSIONS: usize, const BYTES: usize> Transport<SESSIONS, BYTES> {
         })
     }
 
-    fn note_claim(&mut self, frame: &Frame) {
-        let sa = frame.id().sa();
-        let has_name = frame.bytes().len() == 8 && frame.bytes().iter().any(|byte| *byte != 0);
-        if let Some(word) = self.claimed.get_mut(usize::from(sa / 64))
-            && has_name
-        {
-            *word |= 1 << (sa % 64);
-        }
-    }
-
-    fn is_claimed(&self, sa: u8) -> bool {
-        self.claimed.get(usize::from(sa / 64)).is_some_and(|word| word >> (sa % 64) & 1 == 1)
-    }
-
     /// A free session, or that of a source without a claim for one who `has_claimed`.
     fn room_for(&mut self, has_claimed: bool) -> Option<&mut Session<BYTES>> {
         let free = self.sessions.iter().position(|s| s.stage == Stage::Free);
-        let weak = |s: &Session<BYTES>| s.is_running() && !s.sending && !self.is_claimed(s.sa);
+        let weak =
+            |s: &Session<BYTES>| s.is_running() && !s.sending && !self.claimed.contains(s.sa);
         let displaced = || self.sessions.iter().position(weak).filter(|_| has_claimed);
         let index = free.or_else(displaced);
         if free.is_none() {

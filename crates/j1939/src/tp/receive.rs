@@ -37,7 +37,7 @@ impl<const SESSIONS: usize, const BYTES: usize> Transport<SESSIONS, BYTES> {
             }
             running.stage = Stage::Free;
         }
-        let has_claimed = self.is_claimed(sa);
+        let has_claimed = self.claimed.contains(sa);
         let fits = len as usize <= BYTES;
         let silent = self.role == Role::Listener;
         let Some(session) = fits.then(|| self.room_for(has_claimed)).flatten() else {
