@@ -21,18 +21,30 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("planner", vec!["tractrix-core", "road", "driver-models"]),
         ("traffic-client", vec!["tractrix-core", "road", "driver-models"]),
         ("tractrix-j1939", vec!["tractrix-core"]),
+        ("recording", vec!["tractrix-core", "road"]),
         ("sim", plant.clone()),
         ("diagnosis", vec!["tractrix-core", "road", "dynamics", "tractrix-j1939"]),
-        ("truck-node", vec!["tractrix-core", "road", "driver-models", "planner", "tractrix-j1939"]),
+        (
+            "truck-node",
+            vec![
+                "tractrix-core",
+                "road",
+                "driver-models",
+                "planner",
+                "tractrix-j1939",
+                "recording",
+            ],
+        ),
         ("tractrix-python", [&plant[..], &["sim", "diagnosis"]].concat()),
-        ("sim-server", [plant, vec!["sim", "diagnosis"]].concat()),
+        ("sim-server", [plant, vec!["sim", "diagnosis", "recording"]].concat()),
     ])
 }
 
 /// Third-party crates that only one room may know.
-const ONLY: [(&str, &[&str]); 5] = [
+const ONLY: [(&str, &[&str]); 6] = [
     ("tokio", &["sim-server"]),
     ("axum", &["sim-server"]),
+    ("mcap", &["recording"]),
     ("pyo3", &["tractrix-python"]),
     ("clarabel", &["planner"]),
     ("socketcan", &["tractrix-j1939"]),

@@ -3,6 +3,8 @@
 use std::error::Error;
 use std::path::Path;
 
+use recording::{RecordingError, Torn};
+
 /// Why a command failed. The message is one line that names the key, file or value.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
@@ -57,6 +59,16 @@ impl Failure {
         }
     }
 
+    /// A recording without an end, and what of it can be saved.
+    pub(crate) fn of_torn(torn: Torn) -> Self {
+        let failure = Self::from(torn.why);
+        if torn.kept_s <= 0.0 {
+            return failure;
+        }
+        let (path, kept_s) = (torn.path.display(), torn.kept_s);
+        failure.hint(&format!("its first {kept_s:.0} s are saved by `sim-server recover {path}`"))
+    }
+
     /// The same failure with what helps.
     #[must_use]
     pub(crate) fn hint(self, what: &str) -> Self {
@@ -87,6 +99,16 @@ impl Failure {
     /// The message on one line.
     pub(crate) fn line(&self) -> String {
         tractrix_core::words::with_short_numbers(&one_line(&self.to_string()))
+    }
+}
+
+impl From<RecordingError> for Failure {
+    fn from(error: RecordingError) -> Self {
+        match error {
+            RecordingError::Read { path, why } => Self::file(&path, why),
+            RecordingError::Write { path, source } => Self::writing(&path, &*source),
+            other => Self::work(other),
+        }
     }
 }
 
@@ -125,8 +147,8 @@ mod tests {
     #[test]
     fn a_full_disk_is_failed_work_and_a_wrong_place_is_bad_input() {
         let write = |kind: io::ErrorKind| {
-            let wrapped = mcap::McapError::Io(io::Error::from(kind));
-            Failure::writing(Path::new("out/run.mcap"), &wrapped)
+            let source = Box::new(io::Error::from(kind));
+            Failure::from(RecordingError::Write { path: "out/run.mcap".into(), source })
         };
         for full in [io::ErrorKind::StorageFull, io::ErrorKind::FileTooLarge] {
             let failure = write(full);

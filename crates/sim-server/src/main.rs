@@ -9,13 +9,11 @@ mod cmd;
 mod dashboard;
 mod driver;
 mod failure;
-mod lane_lines;
 mod out_folder;
 mod output;
 mod picture;
 mod progress;
 mod provenance;
-mod recording;
 mod signals;
 
 use std::process::ExitCode;

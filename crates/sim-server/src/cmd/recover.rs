@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use clap::Parser;
+use recording::{Recovered, recover};
 use serde::Serialize;
 
 use crate::failure::Failure;
 use crate::output;
 use crate::provenance::Provenance;
-use crate::recording::recover::{Recovered, recover};
 
 /// Writes FILE.recovered.mcap with everything up to the tear.
 #[derive(Debug, Parser)]

@@ -1,12 +1,12 @@
 //! The road as the page draws it: lane borders in the map, markings, and the profile over distance.
 
+use recording::Combination;
+use recording::lane_lines::{BORDER_STEP_M, LaneLines, Marking};
 use road::{LaneKind, LaneTrack, Road, RoadPoint};
 use serde::Serialize;
 
 use super::strip::round;
-use crate::lane_lines::{BORDER_STEP_M, LaneLines, Marking};
 use crate::provenance::SCHEMA;
-use crate::recording::Combination;
 
 /// Distance between two points of the profile, m.
 const PROFILE_STEP_M: f64 = 20.0;

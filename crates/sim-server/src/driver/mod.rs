@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
+use recording::Recording;
 use serde::Serialize;
 use sim::{EndReason, Status, TickTime, TickTimes, World};
 use tractrix_core::{Recorder, Tick};
@@ -19,7 +20,6 @@ use self::pace::Pacer;
 use crate::dashboard::Publisher;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::recording::Recording;
 
 /// What a viewer is told about the run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -4,22 +4,17 @@
 //! make of it (see [`diagnosis::logger`]). GPS speed, accelerometer, coolant and the road's curvature are
 //! not in a recording.
 
-use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use diagnosis::Channel;
 use diagnosis::logger::{Draw, as_logged};
 use dynamics::{TruckModel, TruckParameters};
-use mcap::records::{Record, op};
+use recording::{Entry, Wanted};
 use sim::Scenario;
 use tractrix_core::ZERO_DEGC_K;
 
 use super::folder::{STEP_S, Table};
 use crate::failure::Failure;
-use crate::recording::Layout;
-use crate::recording::recover::{Records, attachment_is_whole};
 
 /// Name of a recording in its folder.
 const RECORDING: &str = "run.mcap";
@@ -44,7 +39,7 @@ pub(super) fn recordings(path: &Path) -> Vec<PathBuf> {
 }
 
 /// Fields of `/truck/state` that are read, in the order of the message.
-const STATE: [&str; 17] = [
+const STATE_FIELDS: [&str; 17] = [
     "s_m",
     "grade_rad",
     "speed_m_s",
@@ -64,8 +59,16 @@ const STATE: [&str; 17] = [
     "command_retarder_frac",
 ];
 /// Fields of `/odom` that are read.
-const ODOMETRY: [&str; 3] =
+const ODOMETRY_FIELDS: [&str; 3] =
     ["pose.pose.position.z", "pose.pose.orientation.z", "pose.pose.orientation.w"];
+
+/// What is read of a recording, by these numbers.
+const TOPICS: [Wanted<'_>; 2] = [
+    Wanted { topic: "/truck/state", fields: &STATE_FIELDS },
+    Wanted { topic: "/odom", fields: &ODOMETRY_FIELDS },
+];
+const STATE: usize = 0;
+const ODOMETRY: usize = 1;
 
 const COLUMNS: [&str; 20] = [
     "time_s",
@@ -95,14 +98,9 @@ const COLUMNS: [&str; 20] = [
 /// # Errors
 /// [`Failure::Input`] if it is no recording of this program, or holds no state.
 pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<Table, Failure> {
-    let input = File::open(path).map_err(|e| Failure::file(path, e))?;
-    let bytes = input.metadata().map_err(|e| Failure::file(path, e))?.len();
-    let mut records = Records::new(BufReader::new(input), bytes);
     let folder = path.parent().and_then(Path::file_name);
     let name = folder.map_or_else(|| "run".to_owned(), |n| n.to_string_lossy().into_owned());
     let mut reader = Reader {
-        definitions: BTreeMap::new(),
-        topics: BTreeMap::new(),
         altitude_heading: None,
         scenario: None,
         table: Table::new(name, &COLUMNS),
@@ -112,14 +110,9 @@ pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<T
         climbed_m: Vec::new(),
         draw: Draw::of_seed(seed),
     };
-    while let Some((code, body)) = records.next_record().map_err(|e| Failure::file(path, e))? {
-        let damaged = code == op::ATTACHMENT && !attachment_is_whole(&body);
-        let record = if damaged { None } else { mcap::parse_record(code, &body).ok() };
-        let Some(record) = record else { return Err(Failure::file(path, "a record is damaged")) };
-        reader.take(record);
-        if code == op::DATA_END {
-            break;
-        }
+    let mut recording = recording::Reader::open(path, &TOPICS)?;
+    while let Some(entry) = recording.next_entry()? {
+        reader.take(entry);
     }
     let scenario = reader.scenario.as_deref().ok_or_else(|| {
         Failure::file(path, "no recording of this program (no scenario is attached), or torn")
@@ -137,8 +130,6 @@ pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<T
 }
 
 struct Reader {
-    definitions: BTreeMap<u16, Layout>,
-    topics: BTreeMap<u16, (Topic, Layout, Vec<usize>)>,
     altitude_heading: Option<(f64, f64)>,
     scenario: Option<String>,
     table: Table,
@@ -149,57 +140,28 @@ struct Reader {
     draw: Draw,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Topic {
-    State,
-    Odometry,
-}
-
 impl Reader {
-    fn take(&mut self, record: Record<'_>) {
-        match record {
-            Record::Schema { header, data } => {
-                let layout = Layout::of(&String::from_utf8_lossy(&data));
-                self.definitions.insert(header.id, layout);
-            }
-            Record::Channel(c) => {
-                let topic = match c.topic.as_str() {
-                    "/truck/state" => (Topic::State, &STATE[..]),
-                    "/odom" => (Topic::Odometry, &ODOMETRY[..]),
-                    _ => return,
-                };
-                let Some(layout) = self.definitions.get(&c.schema_id) else { return };
-                let wanted: Option<Vec<usize>> = topic.1.iter().map(|n| layout.index(n)).collect();
-                if let Some(wanted) = wanted {
-                    self.topics.insert(c.id, (topic.0, layout.clone(), wanted));
+    fn take(&mut self, entry: Entry) {
+        match entry {
+            Entry::Values { wanted, time, values } => match (wanted, &*values) {
+                (ODOMETRY, [z, qz, qw]) => {
+                    self.altitude_heading = Some((*z, 2.0 * qz.atan2(*qw)));
                 }
-            }
-            Record::Message { header, data } => {
-                let Some((topic, layout, wanted)) = self.topics.get(&header.channel_id) else {
-                    return;
-                };
-                let time_s = header.log_time as f64 * 1e-9;
-                if *topic == Topic::State && time_s < self.last_s + STEP_S - EARLY_S {
-                    return;
+                (STATE, values) if time.seconds() >= self.last_s + STEP_S - EARLY_S => {
+                    self.state(time.seconds(), values);
                 }
-                match (topic, layout.read(&data, wanted).as_deref()) {
-                    (Topic::Odometry, Some([z, qz, qw])) => {
-                        self.altitude_heading = Some((*z, 2.0 * qz.atan2(*qw)));
-                    }
-                    (Topic::State, Some(state)) => self.state(time_s, state),
-                    _ => {}
-                }
-            }
-            Record::Attachment { header, data, .. } if header.name == "scenario.toml" => {
+                _ => {}
+            },
+            Entry::Attachment { name, data } if name == "scenario.toml" => {
                 self.scenario = Some(String::from_utf8_lossy(&data).into_owned());
             }
-            _ => {}
+            Entry::Attachment { .. } => {}
         }
     }
 
     fn state(&mut self, time_s: f64, state: &[f64]) {
         let (Some((z, heading)), Ok(state)) =
-            (self.altitude_heading, <[f64; STATE.len()]>::try_from(state))
+            (self.altitude_heading, <[f64; STATE_FIELDS.len()]>::try_from(state))
         else {
             return;
         };

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use planner::decider::DeciderKind;
+use recording::{Combination, Geodesy, Recording, RunHeader, Scenery};
 use road::Road;
 use sim::{EndReason, GhostReport, RunReport, Scenario, TrafficKind, WallClock, World};
 use tokio::sync::Notify;
@@ -20,7 +21,6 @@ use crate::out_folder::OutFolder;
 use crate::output;
 use crate::progress::Progress;
 use crate::provenance::{GIT_REVISION, Provenance, VERSION};
-use crate::recording::{Combination, Recording, RunHeader, Torn};
 use crate::signals::stop_signal;
 
 /// What is written.
@@ -159,8 +159,13 @@ fn start_recording(
     ]);
     let scenario_toml = toml::to_string(scenario).map_err(Failure::work)?;
     let road = Arc::clone(world.road());
-    let header = RunHeader { metadata, scenario_toml, road, combination };
-    Recording::create(&out.begin("run.mcap")?, header)
+    let geodesy = Geodesy::of(&road).unwrap_or_else(|why| {
+        output::note(&format!("{}: {why}: no /fix in the recording", road.name()));
+        None
+    });
+    let scenery = Scenery { road, combination, geodesy };
+    let header = RunHeader { metadata, scenario_toml, scenery };
+    Ok(Recording::create(&out.begin("run.mcap")?, header)?)
 }
 
 /// A signal stops the run between two ticks, and ends the waiting of whoever waits for it.
@@ -208,7 +213,7 @@ fn finish(
         out.keep();
     }
     let summary_written = out.write("summary.json", &json);
-    recorded.map_err(Torn::into_failure)?;
+    recorded.map_err(Failure::of_torn)?;
     summary_written?;
     let text = ended.world.traffic().manifest().to_toml().map_err(Failure::work)?;
     out.write("traffic.manifest.toml", text)?;

@@ -67,10 +67,10 @@ const DEFINITIONS: &[(&str, &str)] = &[
          visualization_msgs/UVCoordinate[] uv_coordinates\nstring text\nstring mesh_resource\n\
          visualization_msgs/MeshFile mesh_file\nbool mesh_use_embedded_materials\n",
     ),
-    ("truck_msgs/TruckState", include_str!("../../../msg/truck_msgs/TruckState.msg")),
-    ("truck_msgs/PlanState", include_str!("../../../msg/truck_msgs/PlanState.msg")),
-    ("truck_msgs/Scene", include_str!("../../../msg/truck_msgs/Scene.msg")),
-    ("truck_msgs/SceneVehicle", include_str!("../../../msg/truck_msgs/SceneVehicle.msg")),
+    ("truck_msgs/TruckState", include_str!("../../msg/truck_msgs/TruckState.msg")),
+    ("truck_msgs/PlanState", include_str!("../../msg/truck_msgs/PlanState.msg")),
+    ("truck_msgs/Scene", include_str!("../../msg/truck_msgs/Scene.msg")),
+    ("truck_msgs/SceneVehicle", include_str!("../../msg/truck_msgs/SceneVehicle.msg")),
 ];
 
 fn definition(name: &str) -> Option<&'static str> {

@@ -6,8 +6,8 @@ use tractrix_core::Time;
 
 use super::{Scenery, in_map};
 use crate::lane_lines::{LaneLines, Marking, Paint, Side};
-use crate::recording::ros::marker::{Color, Marker, MarkerArray};
-use crate::recording::ros::standard::Vector3;
+use crate::ros::marker::{Color, Marker, MarkerArray};
+use crate::ros::standard::Vector3;
 
 /// A marker belongs to one stretch of the road this long, m, and keeps its id however often it is
 /// sent.
@@ -25,7 +25,7 @@ const PAINT: Color = Color { r: 0.9, g: 0.9, b: 0.88, a: 1.0 };
 const PAINT_WIDTH_M: f64 = 0.15;
 
 /// The lines of all stretches that a range of stations touches, in messages below 100 kB.
-pub(in crate::recording) fn lane_markers(
+pub(super) fn lane_markers(
     now: Time,
     stations_m: &Range<f64>,
     scenery: &Scenery,

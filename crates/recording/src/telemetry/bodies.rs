@@ -5,30 +5,40 @@ use serde::Serialize;
 use tractrix_core::{EgoState, Geometry, LateralLimits, Neighbour, VehicleClass, VehicleLimits};
 
 use super::Scenery;
-use crate::recording::ros::marker::{Color, Marker};
-use crate::recording::ros::standard::{Header, Pose, Quaternion, Vector3};
+use crate::ros::marker::{Color, Marker};
+use crate::ros::standard::{Header, Pose, Quaternion, Vector3};
 
 /// A station on a body, m ahead of the body's origin.
-pub(crate) type Ahead = f64;
+pub(super) type Ahead = f64;
 
 /// Lengths of the combination as a viewer draws it. Tractor lengths are ahead of the reference
 /// point, trailer lengths ahead of the hitch.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub(crate) struct Combination {
-    pub(crate) tractor_front_m: Ahead,
-    pub(crate) tractor_rear_m: Ahead,
-    pub(crate) hitch_m: Ahead,
-    pub(crate) steer_axle_m: Ahead,
-    pub(crate) drive_axles_m: Vec<Ahead>,
-    pub(crate) trailer_front_m: Ahead,
-    pub(crate) trailer_rear_m: Ahead,
-    pub(crate) trailer_axles_m: Vec<Ahead>,
-    pub(crate) width_m: f64,
+pub struct Combination {
+    /// Front bumper.
+    pub tractor_front_m: f64,
+    /// Tractor's rear end.
+    pub tractor_rear_m: f64,
+    /// Fifth wheel.
+    pub hitch_m: f64,
+    /// Steered axle.
+    pub steer_axle_m: f64,
+    /// Drive axles.
+    pub drive_axles_m: Vec<f64>,
+    /// Trailer's front end.
+    pub trailer_front_m: f64,
+    /// Trailer's rear end.
+    pub trailer_rear_m: f64,
+    /// Trailer axles.
+    pub trailer_axles_m: Vec<f64>,
+    /// Width.
+    pub width_m: f64,
 }
 
 impl Combination {
     /// From what the truck says about itself: two drive axles, three trailer axles.
-    pub(crate) fn new(limits: &VehicleLimits) -> Self {
+    #[must_use]
+    pub fn new(limits: &VehicleLimits) -> Self {
         let (g, l): (&Geometry, &LateralLimits) = (&limits.geometry, &limits.lateral);
         let trailer_m = -g.hitch_to_trailer_axle_m;
         Self {

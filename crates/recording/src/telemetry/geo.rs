@@ -7,7 +7,8 @@ use proj4rs::proj::Proj;
 use proj4rs::transform::transform;
 use road::{GeoReference, Road};
 
-use crate::recording::ros::standard::{Pose, Quaternion, Vector3};
+use crate::error::RecordingError;
+use crate::ros::standard::{Pose, Quaternion, Vector3};
 
 const GEODETIC: &str = "+proj=longlat +datum=WGS84 +no_defs";
 /// Earth-centred, earth-fixed (EPSG 4978).
@@ -23,7 +24,7 @@ pub(super) struct OnEarth {
 
 /// The map's projection, ready for use.
 #[derive(Debug)]
-pub(crate) struct Geodesy {
+pub struct Geodesy {
     reference: GeoReference,
     projection: Proj,
     geodetic: Proj,
@@ -34,11 +35,14 @@ impl Geodesy {
     /// The projection of a road; none if it has no geo reference.
     ///
     /// # Errors
-    /// Names the projection that cannot be used, and why.
-    pub(crate) fn of(road: &Road) -> Result<Option<Self>, String> {
+    /// [`RecordingError::GeoReference`] names the projection that cannot be used, and why.
+    pub fn of(road: &Road) -> Result<Option<Self>, RecordingError> {
         let Some(reference) = road.geo_reference().cloned() else { return Ok(None) };
         let text = &reference.projection;
-        let refused = |why: &str| format!("geoReference {text:?}: {why}");
+        let refused = |why: &str| RecordingError::GeoReference {
+            projection: text.clone(),
+            why: why.to_owned(),
+        };
         let parse = |text: &str| Proj::from_proj_string(text).map_err(|e| refused(&e.to_string()));
         let projection = parse(text)?;
         if projection.is_latlong() || projection.is_geocent() {
@@ -165,7 +169,7 @@ mod tests {
             ("+proj=", "geoReference"),
             ("+ = =", "geoReference"),
         ] {
-            let error = Geodesy::of(&road(text, [0.0; 3])).unwrap_err();
+            let error = Geodesy::of(&road(text, [0.0; 3])).unwrap_err().to_string();
             assert!(error.contains(why), "{text}: {error}");
         }
         assert!(Geodesy::of(&road::builtin::flat(100.0)).unwrap().is_none());

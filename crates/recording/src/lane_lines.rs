@@ -5,48 +5,60 @@ use road::{LaneKind, LaneTrack, Road, RoadPoint};
 use serde::Serialize;
 
 /// Distance between two points of a border, m: 5 mm off a 600 m curve.
-pub(crate) const BORDER_STEP_M: f64 = 5.0;
+pub const BORDER_STEP_M: f64 = 5.0;
 /// Two lanes whose borders are closer than this touch, m.
 const TOUCH_M: f64 = 0.5;
 
 /// The borders of a lane over a stretch of road.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct LaneLines {
+pub struct LaneLines {
     /// Number of the first point along the lane: the same for any stretch that holds it.
-    pub(crate) first: usize,
-    pub(crate) left: Vec<RoadPoint>,
-    pub(crate) right: Vec<RoadPoint>,
-    pub(crate) markings: Vec<Marking>,
+    pub first: usize,
+    /// Points of the left border.
+    pub left: Vec<RoadPoint>,
+    /// Points of the right border.
+    pub right: Vec<RoadPoint>,
+    /// The painted lines along them.
+    pub markings: Vec<Marking>,
 }
 
 /// A painted line along a border, from one of the stretch's points to another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) struct Marking {
-    pub(crate) side: Side,
-    pub(crate) line: Paint,
-    pub(crate) first: usize,
-    pub(crate) last: usize,
+pub struct Marking {
+    /// Which border.
+    pub side: Side,
+    /// How it is painted.
+    pub line: Paint,
+    /// Its first point among those of the border.
+    pub first: usize,
+    /// Its last one.
+    pub last: usize,
 }
 
 /// A side of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Side {
+pub enum Side {
+    /// In the direction of travel.
     Left,
+    /// In the direction of travel.
     Right,
 }
 
 /// How a line is painted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Paint {
+pub enum Paint {
+    /// Not to be crossed.
     Solid,
+    /// Between two lanes.
     Dashed,
 }
 
 impl LaneLines {
     /// Points every [`BORDER_STEP_M`] from the lane's start, those between two stations.
-    pub(crate) fn between(road: &Road, lane: &LaneTrack, from_m: f64, to_m: f64) -> Self {
+    #[must_use]
+    pub fn between(road: &Road, lane: &LaneTrack, from_m: f64, to_m: f64) -> Self {
         let number = |s_m: f64| ((s_m - lane.s_start_m) / BORDER_STEP_M).max(0.0);
         let (first, end) = (number(from_m).floor() as usize, number(to_m).ceil() as usize);
         let count = number(lane.s_end_m).floor() as usize;

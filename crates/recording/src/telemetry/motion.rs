@@ -4,7 +4,7 @@ use tractrix_core::{Tick, Time};
 
 use super::bodies::{Bodies, on_road};
 use super::{Scenery, in_map};
-use crate::recording::ros::standard::{
+use crate::ros::standard::{
     Clock, Header, NavSatFix, NavSatStatus, Odometry, Path, Pose, PoseStamped, PoseWithCovariance,
     Quaternion, Stamp, TfMessage, Transform, TransformStamped, Twist, TwistWithCovariance, Vector3,
 };
@@ -21,13 +21,13 @@ const VERTICAL_SPEED: f64 = 1.0;
 const SWAY: f64 = 0.05;
 
 /// `/clock`.
-pub(in crate::recording) fn clock(now: Time) -> Clock {
+pub(super) fn clock(now: Time) -> Clock {
     Clock { clock: Stamp::of(now) }
 }
 
 /// `/tf`: `map` to `base_link` (the reference point) and `base_link` to `trailer` (the hitch,
 /// turned by the articulation and the change of the road's attitude between the two bodies).
-pub(in crate::recording) fn transforms(tick: &Tick<'_>, scenery: &Scenery) -> TfMessage {
+pub(super) fn transforms(tick: &Tick<'_>, scenery: &Scenery) -> TfMessage {
     let Bodies { tractor, trailer } = Bodies::of(tick.ego, scenery);
     let hitch = Vector3 { x: scenery.combination.hitch_m, y: 0.0, z: 0.0 };
     let turned = tractor.orientation.inverse_times(trailer.orientation);
@@ -39,7 +39,7 @@ pub(in crate::recording) fn transforms(tick: &Tick<'_>, scenery: &Scenery) -> Tf
 
 /// `/tf_static`: points of tractor and trailer on the ground, and `earth` to `map` where the road
 /// has a geo reference.
-pub(in crate::recording) fn static_transforms(scenery: &Scenery) -> TfMessage {
+pub(super) fn static_transforms(scenery: &Scenery) -> TfMessage {
     let c = &scenery.combination;
     let none = Quaternion::from_yaw_pitch_roll(0.0, 0.0, 0.0);
     let stamp = Stamp::default();
@@ -76,7 +76,7 @@ fn transform(
 }
 
 /// `/odom`.
-pub(in crate::recording) fn odometry(tick: &Tick<'_>, scenery: &Scenery) -> Odometry {
+pub(super) fn odometry(tick: &Tick<'_>, scenery: &Scenery) -> Odometry {
     let ego = tick.ego;
     let pose = Bodies::of(ego, scenery).tractor;
     let twist = Twist {
@@ -102,7 +102,7 @@ fn diagonal(variances: [f64; 6]) -> [f64; 36] {
 }
 
 /// `/fix`: the reference point on the earth; none where the road has no geo reference.
-pub(in crate::recording) fn fix(tick: &Tick<'_>, scenery: &Scenery) -> Option<NavSatFix> {
+pub(super) fn fix(tick: &Tick<'_>, scenery: &Scenery) -> Option<NavSatFix> {
     let ego = tick.ego;
     let at = scenery.geodesy.as_ref()?.on_earth(ego.x_m, ego.y_m, ego.z_m)?;
     Some(NavSatFix {
@@ -117,7 +117,7 @@ pub(in crate::recording) fn fix(tick: &Tick<'_>, scenery: &Scenery) -> Option<Na
 }
 
 /// `/plan/path`.
-pub(in crate::recording) fn path(tick: &Tick<'_>, scenery: &Scenery) -> Path {
+pub(super) fn path(tick: &Tick<'_>, scenery: &Scenery) -> Path {
     let header = in_map(tick.now);
     let poses = tick.plan.path.iter().map(|p| {
         let z = scenery.road.at(p.s_m, p.d_m).z_m;

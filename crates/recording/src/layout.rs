@@ -151,8 +151,8 @@ fn flatten(
 
 #[cfg(test)]
 mod tests {
-    use super::super::ros::schema::schema_text;
     use super::*;
+    use crate::ros::schema::schema_text;
 
     #[test]
     fn nested_fields_have_dotted_names_and_values_where_cdr_puts_them() {

@@ -1,0 +1,151 @@
+//! Writing the MCAP file: channels, messages, chunks.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, Compression, WriteOptions, Writer};
+use tractrix_core::Time;
+
+use crate::error::RecordingError;
+use crate::topic::{Topic, TopicMessage};
+
+/// Options of every file that this program writes; one place, so that a recovered file is alike.
+pub(crate) fn write_options() -> WriteOptions {
+    WriteOptions::new()
+        .profile("ros2")
+        .library(format!("tractrix {}", env!("CARGO_PKG_VERSION")))
+        .compression(Some(Compression::Zstd))
+        .compression_threads(0)
+        .chunk_size(Some(CHUNK_BYTES))
+}
+
+const CHUNK_BYTES: u64 = 1024 * 1024;
+
+/// Quality of service of a latched topic in rosbag2's words (`rmw_qos_profile_t`): keep the last,
+/// reliable, transient local, no deadlines.
+const LATCHED: &str = "\
+- history: 1
+  depth: 1
+  reliability: 1
+  durability: 1
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: 1
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+";
+
+/// An open topic.
+struct Channel {
+    id: u16,
+    sequence: u32,
+}
+
+/// An MCAP file under construction.
+pub(crate) struct McapFile {
+    path: PathBuf,
+    writer: Writer<BufWriter<File>>,
+    channels: BTreeMap<&'static str, Channel>,
+}
+
+impl McapFile {
+    /// Creates the file; it must be possible to write there.
+    pub(crate) fn create(path: &Path) -> Result<Self, RecordingError> {
+        let file = File::create(path).map_err(|e| RecordingError::write(path, e))?;
+        let writer = write_options()
+            .create(BufWriter::new(file))
+            .map_err(|e| RecordingError::write(path, e))?;
+        Ok(Self { path: path.to_owned(), writer, channels: BTreeMap::new() })
+    }
+
+    /// Opens a topic.
+    pub(crate) fn open(&mut self, topic: &Topic) -> Result<(), RecordingError> {
+        let mut metadata = BTreeMap::new();
+        if topic.is_latched {
+            metadata.insert("offered_qos_profiles".to_owned(), LATCHED.to_owned());
+        }
+        let id = self
+            .writer
+            .add_schema(topic.type_name, "ros2msg", topic.schema().as_bytes())
+            .and_then(|schema| self.writer.add_channel(schema, topic.name, "cdr", &metadata))
+            .map_err(|e| self.failed(e))?;
+        self.channels.insert(topic.name, Channel { id, sequence: 0 });
+        Ok(())
+    }
+
+    /// Writes one message at a simulation time; its topic must be open.
+    pub(crate) fn write(
+        &mut self,
+        time: Time,
+        message: &TopicMessage,
+    ) -> Result<(), RecordingError> {
+        let name = message.topic.name;
+        let Some(channel) = self.channels.get_mut(name) else {
+            return Err(RecordingError::Encode { topic: name, why: "it is not open".to_owned() });
+        };
+        channel.sequence = channel.sequence.wrapping_add(1);
+        let time_ns = u64::try_from(time.0).unwrap_or_default();
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence: channel.sequence,
+            log_time: time_ns,
+            publish_time: time_ns,
+        };
+        self.writer
+            .write_to_known_channel(&header, &message.cdr)
+            .map_err(|e| RecordingError::write(&self.path, e))
+    }
+
+    /// Writes a record of names and values.
+    pub(crate) fn metadata(
+        &mut self,
+        name: &str,
+        metadata: BTreeMap<String, String>,
+    ) -> Result<(), RecordingError> {
+        let record = Metadata { name: name.to_owned(), metadata };
+        self.writer.write_metadata(&record).map_err(|e| self.failed(e))
+    }
+
+    /// Attaches a file.
+    pub(crate) fn attach(
+        &mut self,
+        name: &str,
+        kind: &str,
+        data: &[u8],
+    ) -> Result<(), RecordingError> {
+        let attachment = Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: name.to_owned(),
+            media_type: kind.to_owned(),
+            data: data.into(),
+        };
+        self.writer.attach(&attachment).map_err(|e| self.failed(e))
+    }
+
+    /// Closes the chunk and hands everything to the operating system.
+    pub(crate) fn flush(&mut self) -> Result<(), RecordingError> {
+        self.writer.flush().map_err(|e| self.failed(e))
+    }
+
+    /// Writes the summary section; the file is whole after it.
+    pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
+        self.writer.finish().map_err(|e| RecordingError::write(&self.path, e))?;
+        let file = self.writer.into_inner().into_inner();
+        let file = file.map_err(|e| RecordingError::write(&self.path, e.into_error()))?;
+        match file.sync_all() {
+            // A pipe or device has nothing to sync.
+            Err(e) if e.kind() != std::io::ErrorKind::InvalidInput => {
+                Err(RecordingError::write(&self.path, e))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn failed(&self, error: mcap::McapError) -> RecordingError {
+        RecordingError::write(&self.path, error)
+    }
+}

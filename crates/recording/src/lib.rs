@@ -1,0 +1,31 @@
+//! The recording of a run: an MCAP file of the `ros2` profile (schemas `ros2msg`, messages CDR).
+//!
+//! [`messages`] is the pure step from a tick to the messages of its topics ([`TOPICS`]), for a file
+//! or a network alike ([`static_frames`] and [`lanes_at_start`] come before the first tick). [`Recording`] takes the ticks in the world's thread and hands them over a bounded
+//! channel to a writer thread; when the disk is slower than the world, the world waits: nothing is
+//! dropped. Chunks are closed every simulated second, so that a crash loses one second at most;
+//! [`recover`] makes a whole file of the rest. [`Reader`] reads fields by name.
+//!
+//! Message times are simulation time (nanoseconds since the start of the run), so that a recording
+//! of the same seed holds the same messages; the wall time of the start is in the metadata.
+
+mod error;
+mod file;
+pub mod lane_lines;
+mod layout;
+mod reader;
+mod recorder;
+mod records;
+mod recover;
+mod ros;
+mod schedule;
+mod telemetry;
+mod topic;
+
+pub use error::RecordingError;
+pub use reader::{Entry, Reader, Wanted};
+pub use recorder::{Recording, RunHeader, Torn};
+pub use recover::{Recovered, recover};
+pub use schedule::{Due, Schedule};
+pub use telemetry::{Combination, Geodesy, Scenery, lanes_at_start, messages, static_frames};
+pub use topic::{TOPICS, Topic, TopicMessage};

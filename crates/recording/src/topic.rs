@@ -1,0 +1,115 @@
+//! The topics of a recording and their messages as bytes.
+
+use std::marker::PhantomData;
+
+use byteorder::LittleEndian;
+
+use crate::error::RecordingError;
+use crate::ros::Message;
+use crate::ros::marker::MarkerArray;
+use crate::ros::schema::schema_text;
+use crate::ros::standard::{Clock, NavSatFix, Odometry, Path, TfMessage};
+use crate::ros::truck::{PlanState, Scene, TruckState};
+
+/// CDR, little endian, plain (OMG DDSI-RTPS 2.3, 10.5).
+const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
+
+/// A topic: its name and what a subscriber must know about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Topic {
+    /// Name, with the leading slash.
+    pub name: &'static str,
+    /// Type of its messages as ROS 2 writes it: `package/msg/Type`.
+    pub type_name: &'static str,
+    /// Whether a late subscriber gets the last message (QoS transient local).
+    pub is_latched: bool,
+    definition: &'static str,
+}
+
+impl Topic {
+    /// The definition of the topic's type with all types that it uses (`ros2msg`).
+    #[must_use]
+    pub fn schema(&self) -> String {
+        schema_text(self.definition).unwrap_or_default()
+    }
+}
+
+/// A message of a topic, ready for a file or a network.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TopicMessage {
+    /// Where it belongs.
+    pub topic: Topic,
+    /// The message: CDR, little endian, with its encapsulation header.
+    pub cdr: Vec<u8>,
+}
+
+/// A topic that carries messages of one Rust type.
+#[derive(Debug)]
+pub(crate) struct TopicOf<M> {
+    pub(crate) topic: Topic,
+    message: PhantomData<fn(M)>,
+}
+
+impl<M: Message> TopicOf<M> {
+    const fn new(name: &'static str) -> Self {
+        let topic =
+            Topic { name, type_name: M::NAME, is_latched: false, definition: M::DEFINITION };
+        Self { topic, message: PhantomData }
+    }
+
+    const fn latched(name: &'static str) -> Self {
+        let mut of = Self::new(name);
+        of.topic.is_latched = true;
+        of
+    }
+
+    /// The message as bytes.
+    pub(crate) fn encode(&self, message: &M) -> Result<TopicMessage, RecordingError> {
+        let mut cdr = ENCAPSULATION.to_vec();
+        cdr_encoding::to_writer::<M, LittleEndian, _>(&mut cdr, message)
+            .map_err(|e| RecordingError::Encode { topic: self.topic.name, why: e.to_string() })?;
+        Ok(TopicMessage { topic: self.topic, cdr })
+    }
+}
+
+/// Frames that do not change during a run.
+pub(crate) const STATIC_FRAMES: TopicOf<TfMessage> = TopicOf::latched("/tf_static");
+/// Latitude and longitude; only where the road has a geo reference.
+pub(crate) const FIX: TopicOf<NavSatFix> = TopicOf::new("/fix");
+pub(crate) const CLOCK: TopicOf<Clock> = TopicOf::new("/clock");
+pub(crate) const FRAMES: TopicOf<TfMessage> = TopicOf::new("/tf");
+pub(crate) const ODOMETRY: TopicOf<Odometry> = TopicOf::new("/odom");
+pub(crate) const TRUCK: TopicOf<TruckState> = TopicOf::new("/truck/state");
+pub(crate) const PLAN: TopicOf<PlanState> = TopicOf::new("/truck/plan");
+pub(crate) const PATH: TopicOf<Path> = TopicOf::new("/plan/path");
+pub(crate) const SCENE: TopicOf<Scene> = TopicOf::new("/scene");
+pub(crate) const MARKERS: TopicOf<MarkerArray> = TopicOf::new("/markers");
+pub(crate) const LANES: TopicOf<MarkerArray> = TopicOf::latched("/road/lanes");
+
+/// Every topic, in the order in which a file opens them.
+pub const TOPICS: [Topic; 11] = [
+    STATIC_FRAMES.topic,
+    FIX.topic,
+    CLOCK.topic,
+    FRAMES.topic,
+    ODOMETRY.topic,
+    TRUCK.topic,
+    PLAN.topic,
+    PATH.topic,
+    SCENE.topic,
+    MARKERS.topic,
+    LANES.topic,
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_topic_has_a_name_of_its_own_and_a_definition() {
+        for (i, topic) in TOPICS.iter().enumerate() {
+            assert!(!topic.schema().is_empty(), "{}", topic.name);
+            assert!(TOPICS[..i].iter().all(|other| other.name != topic.name), "{}", topic.name);
+        }
+    }
+}
