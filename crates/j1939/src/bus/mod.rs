@@ -6,6 +6,8 @@
 //! | `faults` | loss, delay, duplicates, corruption and bus-off around any bus | `std` |
 //! | `tap` | every frame both ways to a recorder | |
 //! | `candump` | logs of the tool of that name: read, write, replay | `std` |
+//! | `socketcan` | an interface of the Linux kernel | `std` |
+//! | `socketcand` | frames over TCP, client and server | `std` |
 
 #[cfg(feature = "std")]
 pub mod candump;
@@ -14,6 +16,10 @@ mod error;
 pub mod faults;
 #[cfg(feature = "std")]
 pub mod loopback;
+#[cfg(all(feature = "std", target_os = "linux"))]
+pub mod socketcan;
+#[cfg(feature = "std")]
+pub mod socketcand;
 pub mod tap;
 
 pub use error::BusError;
