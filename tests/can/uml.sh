@@ -49,7 +49,7 @@ timeout -k 5 $((limit_s + 60)) linux.uml root=none rootfstype=hostfs rootflags=/
   init="$work/init" con0=fd:0,fd:1 con=null quiet panic=-1 </dev/null >"$work/log" 2>&1 &
 uml=$!
 wait "$uml"
-tr -d '\r' <"$work/log"
+tr -d '\r' <"$work/log" | sed 's/\x1b\[[0-9;]*m//g'
 code=$(tr -d '\r' <"$work/log" | sed -n 's/^RC=\([0-9]*\)$/\1/p' | tail -n 1)
 [ -n "$code" ] || { echo "User-Mode Linux ended without a result"; exit 1; }
 exit "$code"

@@ -4,142 +4,41 @@
 //! `tests/can/uml.sh` runs them in User-Mode Linux. Every wait is for an event, with a bound.
 #![cfg(target_os = "linux")]
 
-use std::io::{BufReader, Read};
+mod wall;
+
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
-use std::sync::mpsc::{Receiver, channel};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use j1939::bus::{Bus, BusError, socketcan::SocketCan};
-use j1939::{
-    ADDRESS_CLAIMED_PGN, AddressClaim, Frame, Id, Name, REQUEST_PGN, Request, TpEvent, Transport,
-};
+use j1939::{ADDRESS_CLAIMED_PGN, AddressClaim, Frame, Id, Name, REQUEST_PGN, Request};
 use tractrix_core::Time;
+use wall::{Node, PATIENCE, Seen, Tool};
 
-const PATIENCE: Duration = Duration::from_secs(40);
 /// A parameter group with a destination on the second data page, as in the kernel's own examples.
 const PGN: u32 = 0x1_2300;
 const OURS: u8 = 0x90;
 const KERNELS: u8 = 0x80;
 
-/// Our stack on `vcan0`, in wall time.
-struct Node {
-    start: Instant,
-    bus: SocketCan,
-    transport: Transport<4, 20_000>,
-    claim: AddressClaim,
+fn vcan0() -> SocketCan {
+    SocketCan::open("vcan0", &[]).unwrap()
 }
 
-/// What a node has seen.
-enum Seen {
-    Frame(Frame),
-    Received {
-        pgn: u32,
-        sa: u8,
-        bytes: Vec<u8>,
-    },
-    Sent,
-    Failed(String),
-    /// Nothing: time has passed.
-    Tick,
+/// A node that need not claim.
+fn with_address() -> Node<SocketCan> {
+    Node::new(vcan0(), AddressClaim::bypass(Name(7), OURS))
 }
 
-impl Node {
-    fn new(claim: AddressClaim) -> Self {
-        let bus = SocketCan::open("vcan0", &[]).unwrap();
-        let mut transport = Transport::new(255);
-        transport.set_address(claim.address());
-        Self { start: Instant::now(), bus, transport, claim }
-    }
-
-    fn with_address() -> Self {
-        Self::new(AddressClaim::bypass(Name(7), OURS))
-    }
-
-    fn now(&self) -> Time {
-        Time(self.start.elapsed().as_nanos() as i64)
-    }
-
-    /// Runs until `done` says so, or panics when nothing comes.
-    fn until(&mut self, what: &str, mut done: impl FnMut(&mut Self, Seen) -> bool) {
-        let start = Instant::now();
-        while start.elapsed() < PATIENCE {
-            let now = self.now();
-            let mut seen = Vec::new();
-            while let Some(heard) = self.bus.receive(now).unwrap() {
-                self.transport.on_frame(heard.time, &heard.value);
-                self.claim.on_frame(heard.time, &heard.value);
-                seen.push(Seen::Frame(heard.value));
-            }
-            self.claim.poll(now, &mut self.bus).unwrap();
-            self.transport.set_address(self.claim.address());
-            self.transport.poll(now, &mut self.bus).unwrap();
-            while let Some(event) = self.transport.event() {
-                seen.push(match event {
-                    TpEvent::Received(m) => {
-                        Seen::Received { pgn: m.pgn, sa: m.sa, bytes: m.bytes.to_vec() }
-                    }
-                    TpEvent::Sent { .. } => Seen::Sent,
-                    failed @ TpEvent::Failed { .. } => Seen::Failed(format!("{failed:?}")),
-                });
-            }
-            seen.push(Seen::Tick);
-            for seen in seen {
-                if done(self, seen) {
-                    return;
-                }
-            }
-            std::thread::sleep(Duration::from_millis(1));
+fn receive(node: &mut Node<SocketCan>, expected: &[u8]) {
+    node.until("a message of the kernel", |_, seen| match seen {
+        Seen::Received { pgn, sa, bytes } => {
+            assert_eq!((pgn, sa, bytes.len()), (PGN, KERNELS, expected.len()));
+            assert!(bytes == expected, "the bytes differ");
+            true
         }
-        panic!("waited in vain for {what}");
-    }
-
-    fn received(&mut self, expected: &[u8]) {
-        self.until("a message of the kernel", |_, seen| match seen {
-            Seen::Received { pgn, sa, bytes } => {
-                assert_eq!((pgn, sa, bytes.len()), (PGN, KERNELS, expected.len()));
-                assert!(bytes == expected, "the bytes differ");
-                true
-            }
-            Seen::Failed(why) => panic!("{why}"),
-            _ => false,
-        });
-    }
-}
-
-/// A tool that ends with the test, and what it prints.
-struct Tool {
-    child: Child,
-    output: Receiver<u8>,
-}
-
-impl Tool {
-    fn start(words: &[&str]) -> Self {
-        let mut command = Command::new(words[0]);
-        let mut child = command
-            .args(&words[1..])
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap_or_else(|e| panic!("{}: {e}", words[0]));
-        let stdout = child.stdout.take().unwrap();
-        let (sender, output) = channel();
-        std::thread::spawn(move || {
-            BufReader::new(stdout)
-                .bytes()
-                .map_while(Result::ok)
-                .try_for_each(|byte| sender.send(byte))
-        });
-        Self { child, output }
-    }
-}
-
-impl Drop for Tool {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+        Seen::Failed(why) => panic!("{why}"),
+        _ => false,
+    });
 }
 
 fn text(len: usize) -> Vec<u8> {
@@ -155,7 +54,7 @@ fn file_of(bytes: &[u8]) -> PathBuf {
 
 /// The kernel sends to us; its tool reports an error of its own afterwards, the bytes count.
 fn kernel_sends(len: usize, broadcast: bool) {
-    let mut node = Node::with_address();
+    let mut node = with_address();
     let file = file_of(&text(len));
     let file = file.to_str().unwrap();
     let _tool = if broadcast {
@@ -163,12 +62,12 @@ fn kernel_sends(len: usize, broadcast: bool) {
     } else {
         Tool::start(&["j1939cat", "-i", file, "vcan0:0x80", ":0x90,0x12300"])
     };
-    node.received(&text(len));
+    receive(&mut node, &text(len));
 }
 
 /// We send to the kernel: again while its tool is not listening yet.
 fn kernel_receives(len: usize, broadcast: bool) {
-    let mut node = Node::with_address();
+    let mut node = with_address();
     let tool = Tool::start(&["j1939cat", "-B", "-r", "vcan0:0x80"]);
     let da = if broadcast { 0xFF } else { KERNELS };
     let start = Instant::now();
@@ -204,7 +103,7 @@ fn kernel_receives(len: usize, broadcast: bool) {
 #[test]
 #[ignore = "needs CAN sockets: tests/can/uml.sh"]
 fn frames_between_sockets_are_all_there_and_own_ones_are_not() {
-    let mut a = SocketCan::open("vcan0", &[]).unwrap();
+    let mut a = vcan0();
     let mut b = SocketCan::open("vcan0", &[]).unwrap();
     let mut filtered = SocketCan::open("vcan0", &[REQUEST_PGN]).unwrap();
     let now = Time(1_000_000_000);
@@ -316,14 +215,14 @@ fn j1939acd_respects_a_smaller_name_and_takes_from_a_larger() {
         _ => None,
     };
     // ours is smaller and there first: the daemon takes the other address
-    let mut node = Node::new(AddressClaim::new(Name(0x10), 128, 0));
+    let mut node = Node::new(vcan0(), AddressClaim::new(Name(0x10), 128, 0));
     node.until("our own address", |node, _| node.claim.address() == Some(128));
     let tool = acd("128,129");
     node.until("a claim of another address", |_, seen| claims(&seen) == Some((0x1100, 129)));
     assert_eq!(node.claim.address(), Some(128));
     drop((tool, node));
     // ours is larger and can choose: the daemon takes it, and we take the next
-    let mut node = Node::new(AddressClaim::new(Name(1 << 63 | 5), 128, 0));
+    let mut node = Node::new(vcan0(), AddressClaim::new(Name(1 << 63 | 5), 128, 0));
     node.until("our own address", |node, _| node.claim.address() == Some(128));
     let _tool = acd("128");
     node.until("a claim of our address", |_, seen| claims(&seen) == Some((0x1100, 128)));
