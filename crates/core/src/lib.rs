@@ -19,6 +19,7 @@ mod fuel;
 mod limits;
 mod limits_check;
 mod plan;
+mod pose;
 mod provenance;
 pub mod road_load;
 mod scene;
@@ -38,6 +39,7 @@ pub use plan::{
     GuardReason, LaneChangeReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus,
     SpeedPoint,
 };
+pub use pose::{Fix, Motion, Pose, PoseSource};
 pub use provenance::Provenance;
 pub use road_load::{RoadLoad, RoadPiece, Wind};
 pub use scene::{Neighbour, Scene, VehicleClass};
