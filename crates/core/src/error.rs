@@ -1,6 +1,7 @@
 //! Errors of the contract types.
 
 use alloc::string::String;
+use alloc::vec::Vec;
 
 /// What can be wrong with a contract value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -25,6 +26,14 @@ pub enum CoreError {
         low: f64,
         /// Highest allowed value.
         high: f64,
+    },
+    /// A truck's data sheet cannot be used.
+    #[error("{file}: {}", wrong.join("; "))]
+    Sheet {
+        /// The file as it was named.
+        file: String,
+        /// Everything that is wrong with it.
+        wrong: Vec<String>,
     },
     /// A table's abscissa does not increase strictly, or its sizes do not match.
     #[error("table {name}: {why}")]

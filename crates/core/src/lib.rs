@@ -24,6 +24,8 @@ mod provenance;
 pub mod road_load;
 mod scene;
 mod seams;
+#[cfg(feature = "std")]
+mod sheet;
 mod status;
 mod table;
 mod time;

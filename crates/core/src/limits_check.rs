@@ -5,7 +5,7 @@
 
 use alloc::{format, string::String, vec::Vec};
 
-use crate::{CoreError, Curve, FuelModel, VehicleLimits};
+use crate::{CoreError, FuelModel, VehicleLimits};
 
 /// Most forward gears: gear sets travel as 32 bits.
 const MOST_GEARS: usize = 32;
@@ -26,6 +26,7 @@ impl VehicleLimits {
     /// | `idle_speed_rad_s` | 1 to 300 | 300 rad/s are 2 865 rpm; an idle speed in rpm is refused |
     /// | `max_speed_rad_s` | above 1.25 times idle, up to 1000 | below it no gear has a range to drive in |
     /// | `lugging_speed_rad_s` | idle to highest speed | the gearbox keeps no gear under power below it |
+    /// | `fuel_density_kg_m3` | 300 to 2000 | liquefied gas; a density in kg/l is refused |
     /// | gear ratios | 0.1 to 100 | overdrive; crawler with splitter and range |
     /// | gear efficiencies | 0.3 to 1 | below it the overrun drag of a gear exceeds its traction |
     /// | `max_decel_m_s2` | 0.5 to 12.5 | the legal minimum of a worn truck is 4.5 (ECE R13); 12.5 is a tyre's limit |
@@ -34,10 +35,17 @@ impl VehicleLimits {
     /// [`CoreError::OutOfRange`] names the first value outside its range, [`CoreError::BadTable`]
     /// the table or list that has the wrong shape.
     pub fn check(&self) -> Result<(), CoreError> {
-        self.check_gears()?;
+        self.violations().into_iter().next().map_or(Ok(()), Err)
+    }
+
+    /// Everything that [`Self::check`] would refuse.
+    #[must_use]
+    pub fn violations(&self) -> Vec<CoreError> {
+        let mut wrong = Vec::new();
+        self.check_gears(&mut wrong);
         let groups: [Vec<Row>; 4] =
             [self.geometry_rows(), self.powertrain_rows(), self.load_rows(), self.lateral_rows()];
-        check_rows(groups.into_iter().flatten())?;
+        check_rows(groups.into_iter().flatten(), &mut wrong);
         let p = &self.powertrain;
         for (name, curve) in [
             ("powertrain.full_load_nm", Some(&p.full_load_nm)),
@@ -45,18 +53,21 @@ impl VehicleLimits {
             ("powertrain.engine_brake_nm", Some(&p.engine_brake_nm)),
             ("powertrain.retarder_force_n", p.retarder_force_n.as_ref()),
         ] {
-            curve.map_or(Ok(()), |curve| check_curve(name, curve, 0.0, 1e6))?;
+            if let Some(curve) = curve {
+                check_each(name, curve.y(), 0.0, 1e6, &mut wrong);
+            }
         }
-        check_fuel(&p.fuel)
+        check_fuel(&p.fuel, &mut wrong);
+        wrong
     }
 
-    fn check_gears(&self) -> Result<(), CoreError> {
+    fn check_gears(&self, wrong: &mut Vec<CoreError>) {
         let p = &self.powertrain;
         let gears = p.gear_ratios.len();
         let lists = [p.gear_efficiency_frac.len(), p.rotating_mass_kg.len()];
         if gears == 0 || gears > MOST_GEARS || lists != [gears; 2] {
             let [efficiencies, masses] = lists;
-            return Err(CoreError::BadTable {
+            wrong.push(CoreError::BadTable {
                 name: "powertrain.gear_ratios".into(),
                 why: format!(
                     "{gears} values, {efficiencies} in gear_efficiency_frac, {masses} in \
@@ -69,9 +80,8 @@ impl VehicleLimits {
             ("powertrain.gear_efficiency_frac", &p.gear_efficiency_frac, 0.3, 1.0),
             ("powertrain.rotating_mass_kg", &p.rotating_mass_kg, 0.0, 1e6),
         ] {
-            check_each(name, values, low, high)?;
+            check_each(name, values, low, high, wrong);
         }
-        Ok(())
     }
 
     fn geometry_rows(&self) -> Vec<Row> {
@@ -105,6 +115,7 @@ impl VehicleLimits {
             ("powertrain.idle_fuel_g_s", p.idle_fuel_g_s, 0.0, 100.0),
             ("powertrain.rotating_mass_neutral_kg", p.rotating_mass_neutral_kg, 0.0, 1e6),
             ("powertrain.shift_duration_s", p.shift_duration_s, 0.0, 10.0),
+            ("powertrain.fuel_density_kg_m3", p.fuel_density_kg_m3, 300.0, 2000.0),
         ]
     }
 
@@ -154,74 +165,55 @@ fn in_range(
     value: f64,
     low: f64,
     high: f64,
-) -> Result<(), CoreError> {
-    if value >= low && value <= high {
-        Ok(())
-    } else {
-        Err(CoreError::OutOfRange { field: field(), value, low, high })
+    wrong: &mut Vec<CoreError>,
+) {
+    if !(value >= low && value <= high) {
+        wrong.push(CoreError::OutOfRange { field: field(), value, low, high });
     }
 }
 
-fn check_rows(rows: impl IntoIterator<Item = Row>) -> Result<(), CoreError> {
-    rows.into_iter()
-        .try_for_each(|(field, value, low, high)| in_range(|| field.into(), value, low, high))
+fn check_rows(rows: impl IntoIterator<Item = Row>, wrong: &mut Vec<CoreError>) {
+    for (field, value, low, high) in rows {
+        in_range(|| field.into(), value, low, high, wrong);
+    }
 }
 
-fn check_each(name: &str, values: &[f64], low: f64, high: f64) -> Result<(), CoreError> {
+fn check_each(name: &str, values: &[f64], low: f64, high: f64, wrong: &mut Vec<CoreError>) {
     for (i, &value) in values.iter().enumerate() {
-        in_range(|| format!("{name}[{i}]"), value, low, high)?;
+        in_range(|| format!("{name}[{i}]"), value, low, high, wrong);
     }
-    Ok(())
 }
 
-fn check_axis(name: &str, axis: &[f64]) -> Result<(), CoreError> {
-    let increases = axis.iter().all(|x| x.is_finite()) && axis.windows(2).all(|w| w[1] > w[0]);
-    if axis.is_empty() || !increases {
-        let why = "the axis must be finite and strictly increasing".into();
-        return Err(CoreError::BadTable { name: name.into(), why });
-    }
-    Ok(())
-}
-
-/// A curve may come out of a file or a message, past [`Curve::new`].
-fn check_curve(name: &str, curve: &Curve, low: f64, high: f64) -> Result<(), CoreError> {
-    check_axis(name, curve.x())?;
-    if curve.x().len() != curve.y().len() {
-        let why = format!("{} abscissae, {} ordinates", curve.x().len(), curve.y().len());
-        return Err(CoreError::BadTable { name: name.into(), why });
-    }
-    check_each(name, curve.y(), low, high)
-}
-
-fn check_fuel(fuel: &FuelModel) -> Result<(), CoreError> {
+fn check_fuel(fuel: &FuelModel, wrong: &mut Vec<CoreError>) {
     let low_load = match fuel {
         FuelModel::Willans { constant_g_s, per_rpm_g_s, per_kw_g_s, low_load } => {
-            check_rows([
+            let rows = [
                 ("powertrain.fuel.constant_g_s", *constant_g_s, 0.0, 100.0),
                 ("powertrain.fuel.per_rpm_g_s", *per_rpm_g_s, 0.0, 1.0),
                 ("powertrain.fuel.per_kw_g_s", *per_kw_g_s, 1e-6, 1.0),
-            ])?;
+            ];
+            check_rows(rows, wrong);
             low_load
         }
         FuelModel::Map { flow_g_s: map, friction_nm, low_load } => {
             let name = "powertrain.fuel.flow_g_s";
-            check_axis(name, map.x())?;
-            check_axis(name, map.y())?;
-            let (speeds, torques) = (map.x().len(), map.y().len());
-            if map.z().len() != speeds * torques || !(map.x()[0] > 0.0) || map.y()[0] != 0.0 {
+            let lowest = |axis: &[f64]| axis.first().copied().unwrap_or(f64::NAN);
+            let (speed_rad_s, torque_nm) = (lowest(map.x()), lowest(map.y()));
+            if !(speed_rad_s > 0.0) || torque_nm != 0.0 {
                 let why = format!(
-                    "{} values for {speeds} speeds above zero and {torques} torques from zero",
-                    map.z().len()
+                    "speeds from {speed_rad_s} rad/s, torques from {torque_nm} Nm; speeds must be \
+                     above zero, torques begin at zero"
                 );
-                return Err(CoreError::BadTable { name: name.into(), why });
+                wrong.push(CoreError::BadTable { name: name.into(), why });
             }
-            check_each(name, map.z(), 0.0, 1e3)?;
-            check_curve("powertrain.fuel.friction_nm", friction_nm, 0.0, 1e5)?;
+            check_each(name, map.z(), 0.0, 1e3, wrong);
+            check_each("powertrain.fuel.friction_nm", friction_nm.y(), 0.0, 1e5, wrong);
             low_load
         }
     };
-    check_rows([
+    let rows = [
         ("powertrain.fuel.low_load.extra_frac", low_load.extra_frac, -0.9, 10.0),
         ("powertrain.fuel.low_load.fades_out_kw", low_load.fades_out_kw, 0.1, 1e4),
-    ])
+    ];
+    check_rows(rows, wrong);
 }

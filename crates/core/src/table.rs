@@ -7,9 +7,25 @@ use crate::CoreError;
 
 /// `y(x)`, piecewise linear, held constant outside its range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "AnyCurve")]
 pub struct Curve {
     x: Vec<f64>,
     y: Vec<f64>,
+}
+
+/// A curve as it comes out of a file or a message.
+#[derive(Deserialize)]
+struct AnyCurve {
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+impl TryFrom<AnyCurve> for Curve {
+    type Error = CoreError;
+
+    fn try_from(c: AnyCurve) -> Result<Self, CoreError> {
+        Self::new("curve", c.x, c.y)
+    }
 }
 
 impl Curve {
@@ -75,10 +91,27 @@ impl Curve {
 
 /// `z(x, y)`, bilinear, held constant outside its range. Row-major: `z[ix * y.len() + iy]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "AnyGrid")]
 pub struct Grid {
     x: Vec<f64>,
     y: Vec<f64>,
     z: Vec<f64>,
+}
+
+/// A grid as it comes out of a file or a message.
+#[derive(Deserialize)]
+struct AnyGrid {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    z: Vec<f64>,
+}
+
+impl TryFrom<AnyGrid> for Grid {
+    type Error = CoreError;
+
+    fn try_from(g: AnyGrid) -> Result<Self, CoreError> {
+        Self::new("grid", g.x, g.y, g.z)
+    }
 }
 
 impl Grid {
@@ -96,6 +129,12 @@ impl Grid {
             });
         }
         Ok(Self { x, y, z })
+    }
+
+    /// A constant.
+    #[must_use]
+    pub fn constant(z: f64) -> Self {
+        Self { x: alloc::vec![0.0], y: alloc::vec![0.0], z: alloc::vec![z] }
     }
 
     /// Value at `(x, y)`.
@@ -181,6 +220,20 @@ mod tests {
         for (a, b) in [(0.3, 0.1), (3.9, 1.9), (1.0, -1.0)] {
             assert!((g.at(a, b) - f(a, b)).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn a_table_without_an_axis_does_not_come_out_of_a_message() {
+        let curve = |x: &[f64], y: &[f64]| Curve::try_from(AnyCurve { x: x.into(), y: y.into() });
+        assert!(curve(&[], &[]).is_err());
+        assert!(curve(&[0.0, 1.0], &[1.0]).is_err());
+        assert!(curve(&[0.0, 1.0], &[1.0, 2.0]).is_ok());
+        let grid = |x: &[f64], y: &[f64], z: &[f64]| {
+            Grid::try_from(AnyGrid { x: x.into(), y: y.into(), z: z.into() })
+        };
+        assert!(grid(&[], &[0.0], &[]).is_err());
+        assert!(grid(&[1.0], &[1.0, 0.0], &[1.0, 2.0]).is_err());
+        assert!(grid(&[1.0], &[0.0, 1.0], &[1.0, 2.0]).is_ok());
     }
 
     #[test]

@@ -34,6 +34,9 @@ pub(crate) enum Command {
     Replay(cmd::replay::Args),
     /// Makes a whole recording of one torn by a crash.
     Recover(cmd::recover::Args),
+    /// Makes sheets of truck files, for programs on a truck.
+    #[command(subcommand)]
+    Truck(cmd::truck::Command),
     /// Lists and shows the built-in scenarios.
     #[command(subcommand)]
     Scenario(cmd::scenario::Command),

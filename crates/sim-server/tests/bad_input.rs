@@ -28,6 +28,26 @@ fn numbers_that_are_no_numbers_are_refused_with_their_flag() {
 }
 
 #[test]
+fn a_sheet_is_not_made_of_a_wrong_truck_or_over_another_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("sheet.toml");
+    let out = out.to_str().unwrap();
+    let sheet = |truck: &str, payload: &str| {
+        refused(&["truck", "sheet", truck, "--payload-kg", payload, "--out", out])
+    };
+    assert!(sheet("no-such-truck", "0").contains("no-such-truck"));
+    assert!(sheet("reference", "-1").contains("--payload-kg"));
+    assert!(sheet("reference", "1e9").contains("mass_kg"));
+    std::fs::write(out, "mine").unwrap();
+    assert!(sheet("reference", "0").contains("--overwrite"));
+    assert_eq!(std::fs::read_to_string(out).unwrap(), "mine");
+    let nowhere = folder.path().join("none/sheet.toml");
+    let nowhere = nowhere.to_str().unwrap();
+    let words = ["truck", "sheet", "reference", "--payload-kg", "0", "--out", nowhere];
+    assert!(refused(&words).contains("none/sheet.toml"));
+}
+
+#[test]
 fn what_the_contract_names_and_this_version_lacks_says_so() {
     for option in [
         &["--vehicle", "bus"][..],

@@ -9,6 +9,7 @@ pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod scenario;
 pub(crate) mod traffic;
+pub(crate) mod truck;
 
 use clap::Parser;
 
@@ -27,6 +28,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Map(command)) => map::run(command),
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Recover(args)) => recover::run(&args),
+        Some(Command::Truck(command)) => truck::run(&command),
         Some(Command::Scenario(command)) => scenario::run(&command),
     }
 }
