@@ -18,6 +18,7 @@ mod error;
 mod fuel;
 mod limits;
 mod limits_check;
+mod pedal;
 mod plan;
 mod pose;
 mod provenance;

@@ -18,6 +18,7 @@
 //! | `steering` | the place for a maker's steering frame, and an example | none |
 //! | `signal`, `message` | typed messages and the table of their signals | SAE J1939-71 and J1939DA |
 //! | `dbc` | the table for tools that read CAN logs | |
+//! | `truck` | a truck behind its bus: what the planning stack reads and commands | |
 //!
 //! The core needs neither an allocator nor an operating system (`no_std`); the features `alloc` and
 //! `std` add owned buffers and the buses. Nothing that comes from a bus can panic here: what cannot
@@ -41,6 +42,7 @@ mod slot;
 pub mod steering;
 pub mod supervise;
 mod tp;
+pub mod truck;
 mod wire;
 
 pub use address_set::AddressSet;

@@ -114,26 +114,7 @@ impl<'a> InGear<'a> {
     #[must_use]
     pub(super) fn pedal_frac(&self, force_n: f64) -> f64 {
         let indicated_nm = self.net_torque_nm(force_n) + self.loss_nm();
-        if indicated_nm <= 0.0 {
-            return 0.0;
-        }
-        let speed = self.engine_speed_rad_s;
-        let Some(map) = &self.powertrain.pedal_map_nm else {
-            let full =
-                self.powertrain.full_load_nm.at(speed) + self.powertrain.friction_nm.at(speed);
-            return (indicated_nm / full.max(1.0)).clamp(0.0, 1.0);
-        };
-        // Indicated torque grows with the pedal: bisection to 1/4096, finer than the bus's 0.4 %.
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..12 {
-            let mid = 0.5 * (low + high);
-            if map.at(mid, speed) < indicated_nm {
-                low = mid;
-            } else {
-                high = mid;
-            }
-        }
-        0.5 * (low + high)
+        self.powertrain.pedal_frac(indicated_nm, self.engine_speed_rad_s)
     }
 }
 
