@@ -57,10 +57,10 @@ pub enum SimError {
     Stack(#[from] planner::PlannerError),
 }
 
-impl From<planner::DriveError<dynamics::DynamicsError, traffic_client::TrafficError>> for SimError {
-    fn from(e: planner::DriveError<dynamics::DynamicsError, traffic_client::TrafficError>) -> Self {
+impl From<planner::DriveError<SimError, traffic_client::TrafficError>> for SimError {
+    fn from(e: planner::DriveError<SimError, traffic_client::TrafficError>) -> Self {
         match e {
-            planner::DriveError::Ego(e) | planner::DriveError::Command(e) => Self::Truck(e),
+            planner::DriveError::Ego(e) | planner::DriveError::Command(e) => e,
             planner::DriveError::Traffic(e) => Self::Traffic(e),
             other => Self::Drive(other.to_string()),
         }

@@ -16,6 +16,7 @@ mod memory;
 mod metrics;
 mod off_road;
 mod overrides;
+mod plant;
 mod plant_pose;
 mod run_report;
 mod scenario;
@@ -23,6 +24,7 @@ mod sim_truck;
 mod tick_times;
 mod traffic;
 mod traffic_section;
+mod truck;
 mod world;
 
 pub use collision::{Footprint, footprints_overlap};
@@ -34,6 +36,7 @@ pub use memory::{MemoryRecord, MemoryRecorder};
 pub use metrics::{Metrics, Summary};
 pub use off_road::OffRoad;
 pub use overrides::Overrides;
+pub use plant::{Plant, Simulated};
 pub use plant_pose::{PlantPose, PoseNoise};
 pub use run_report::{EndReason, RunReport, WallClock};
 pub use scenario::{EgoStart, RunLimits, Scenario, TruckSection, Weather};
@@ -43,4 +46,5 @@ pub use traffic::{Arrivals, Traffic, read_manifest, recording_of};
 pub use traffic_section::{
     Family, OnFailure, ReplaySection, SumoSection, SumoTimeouts, TrafficKind, TrafficSection,
 };
+pub use truck::Truck;
 pub use world::{Status, World};
