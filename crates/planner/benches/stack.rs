@@ -63,8 +63,14 @@ fn planning(c: &mut Criterion) {
     let s_m = 6_000.0;
     let ego = ego(&road, s_m);
     let path = LateralPath::keep(0);
-    let start =
-        Start { ego: &ego, path: &path, reference_speed_m_s: 22.0, road: &road, limits: &limits };
+    let start = Start {
+        ego: &ego,
+        path: &path,
+        reference_speed_m_s: 22.0,
+        lane_ends_in_m: None,
+        road: &road,
+        limits: &limits,
+    };
     // Free: the cheapest candidate passes. Vetoed: every candidate is planned and refused.
     for (name, room_m) in [("free", 240.0), ("vetoed", 45.0)] {
         let scene = scene(&road, s_m, room_m);

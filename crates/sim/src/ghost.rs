@@ -8,7 +8,8 @@
 //! Both are compared at one place, the truck's, so that height cancels: the ghost drives ahead to it
 //! where it is slower. [`Price`] says what the difference in time and speed is worth. Traffic costs
 //! fuel and time that no driver can save; so the comparison is made a second time over only those
-//! stretches on which traffic did not hold the truck up.
+//! stretches on which traffic did not hold the truck up. It does so until the truck has got back the
+//! speed that it was held up from.
 
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -31,6 +32,9 @@ const STEP_S: f64 = 5.0;
 const PROFILE_STEP_M: f64 = 12.5;
 /// The ghost's drive ends so far before the end of the road, m.
 const END_MARGIN_M: f64 = 5.0;
+/// A truck that was held up has not got over it while it is slower than the ghost by this, m/s: more
+/// than a planner slows by itself.
+const REGAINED_M_S: f64 = 3.0;
 /// A ghost that takes this much longer than the truck to one place has got stuck, s.
 const STUCK_S: f64 = 600.0;
 
@@ -63,7 +67,7 @@ pub struct GhostReport {
     pub saving_frac: Option<f64>,
     /// The same over the stretches on which traffic did not hold the truck up.
     pub free_saving_frac: Option<f64>,
-    /// Time for which traffic held the truck up, s.
+    /// Time for which traffic held the truck up, until it has its speed back, s.
     pub held_up_s: f64,
     /// Distance over which traffic held the truck up, m.
     pub held_up_m: f64,
@@ -165,6 +169,8 @@ pub struct Ghost {
     free: Pair,
     /// Where the comparison has got to: truck and ghost.
     at: Option<(Passed, Passed)>,
+    /// Traffic holds the truck up, or it has not got its speed back since.
+    held_up: bool,
     held_up_here: bool,
     held_up_s: f64,
     held_up_m: f64,
@@ -201,6 +207,7 @@ impl Ghost {
             all: Pair::default(),
             free: Pair::default(),
             at: None,
+            held_up: false,
             held_up_here: false,
             held_up_s: 0.0,
             held_up_m: 0.0,
@@ -213,15 +220,18 @@ impl Ghost {
     pub fn follow(&mut self, now: Time, ego: &EgoState, held_up: bool) {
         self.drive_to(now, ego.s_m);
         let here = Passed::new(now, ego);
+        let ghost = self.passed(here.s_m);
+        let slower = ghost.is_some_and(|ghost| here.speed_m_s < ghost.speed_m_s - REGAINED_M_S);
+        self.held_up = held_up || self.held_up && slower;
         if let Some(last) = self.last.replace(here)
-            && held_up
+            && self.held_up
         {
             self.held_up_here = true;
             self.held_up_s += here.time_s - last.time_s;
             self.held_up_m += here.s_m - last.s_m;
         }
         let due = self.at.is_none_or(|(at, _)| here.s_m >= at.s_m + STEP_M);
-        let Some(ghost) = self.passed(here.s_m).filter(|_| due) else { return };
+        let Some(ghost) = ghost.filter(|_| due) else { return };
         if let Some((from, ghost_from)) = self.at.replace((here, ghost)) {
             let ego = from.leg_to(&here, self.mass_kg);
             let ghost = ghost_from.leg_to(&ghost, self.mass_kg);

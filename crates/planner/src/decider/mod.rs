@@ -144,13 +144,18 @@ impl<'a> View<'a> {
 /// A lane that ends within this distance must be left, whatever the decider wishes, m.
 const LEAVE_WITHIN_M: f64 = 800.0;
 
+/// How far ahead of a station a lane ends that must be left by then, m.
+#[must_use]
+pub(crate) fn lane_ends_in_m(road: &Road, lane: u16, s_m: f64) -> Option<f64> {
+    let track = road.lanes().get(usize::from(lane))?;
+    let rest_m = track.s_end_m - s_m;
+    (track.end != LaneEnd::Continues && rest_m < LEAVE_WITHIN_M).then_some(rest_m)
+}
+
 /// Whether the truck's lane ends soon.
 #[must_use]
 pub(crate) fn lane_ends(view: &View<'_>) -> bool {
-    view.road
-        .lanes()
-        .get(usize::from(view.lane))
-        .is_some_and(|l| l.end != LaneEnd::Continues && l.s_end_m - view.ego.s_m < LEAVE_WITHIN_M)
+    lane_ends_in_m(view.road, view.lane, view.ego.s_m).is_some()
 }
 
 /// The side on which a through lane goes on, left first.

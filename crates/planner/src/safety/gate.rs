@@ -3,7 +3,11 @@
 //!
 //! The ego is predicted along its planned change, the others with their present speed; a vehicle
 //! ahead is also taken to go on braking as it does now, one behind to go on accelerating, both for
-//! [`HOLD_S`]. For every instant until the change is done and the reaction time has passed:
+//! [`HOLD_S`]. Where the truck's lane ends those behind in the target lane must let it in (StVO
+//! section 7 (4)): they are taken to react to its indicator and then to slow comfortably; whoever
+//! does not stops the change, as long as the truck is inside its lane. A truck that pulls away there
+//! counts gaps from where it reaches into the target lane. For every instant until the change is
+//! done and the reaction time has passed:
 //! - target lane, ahead: `gap >= d_safe(ego, other)` and time to collision above the bound;
 //! - target lane, behind, from the trailer's rear: `gap >= d_safe(other, ego)`, same bound;
 //! - own lane, ahead: `gap >= d_safe(ego, other)` as long as the ego's body reaches into the
@@ -15,6 +19,7 @@ use super::rss::{RssConfig, SafeGap};
 use super::surroundings::{EgoExtent, in_lane, reaches};
 use crate::steering::LateralPath;
 use alloc::vec::Vec;
+use driver_models::ballistic;
 use road::Road;
 use tractrix_core::{EgoState, LaneChangeRefusal, Neighbour, Scene, VehicleClass, VehicleLimits};
 
@@ -64,6 +69,11 @@ pub struct Strictness {
     pub own_factor: f64,
     /// Least time to collision, s.
     pub time_to_collision_s: f64,
+    /// Deceleration with which those behind in the target lane let the truck in once they have
+    /// reacted, m/s²; zero: they go on as they do.
+    pub yield_decel_m_s2: f64,
+    /// Gaps count from where the truck's body reaches into the target lane: before, it can stop.
+    pub from_entry: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,12 +88,22 @@ enum Role {
 struct Concern {
     role: Role,
     neighbour: Neighbour,
+    reaction_s: f64,
     safe: SafeGap,
 }
 
 impl Concern {
-    /// Speed and distance travelled at a time from now.
-    fn at(&self, time_s: f64) -> (f64, f64) {
+    /// Speed and distance travelled at a time from now, for somebody behind who yields so.
+    fn at(&self, time_s: f64, yield_decel_m_s2: f64) -> (f64, f64) {
+        if self.role == Role::TargetBehind && yield_decel_m_s2 > 0.0 {
+            let n = &self.neighbour;
+            let present = n.accel_m_s2.max(-yield_decel_m_s2);
+            let (reacted, before_m) =
+                ballistic(n.speed_m_s.max(0.0), present, time_s.min(self.reaction_s));
+            let yielding_s = (time_s - self.reaction_s).max(0.0);
+            let (then, after_m) = ballistic(reacted, -yield_decel_m_s2, yielding_s);
+            return (then, before_m + after_m);
+        }
         let a = match self.role {
             Role::TargetBehind => self.neighbour.accel_m_s2.max(0.0),
             Role::TargetAhead | Role::OwnAhead => self.neighbour.accel_m_s2.min(0.0),
@@ -120,6 +140,8 @@ pub struct Gate {
     extent: EgoExtent,
     reaction_s: f64,
     occupied: bool,
+    /// The target lane is kept clear for an emergency vehicle.
+    kept_clear: bool,
 }
 
 impl Gate {
@@ -129,17 +151,17 @@ impl Gate {
         let GateView { rss, ego, scene, road, limits, grade_rad } = *view;
         let extent = EgoExtent::new(ego, &limits.geometry);
         let response = rss.ego_response(limits);
-        let mut occupied = false;
+        let (mut occupied, mut kept_clear) = (false, false);
         let mut concerns = Vec::new();
         for n in &scene.neighbours {
             let ahead = n.front_s_m > extent.front_s_m;
             let role = if in_lane(road, target, n, extent.width_m) {
-                let behind_m = match n.class {
-                    VehicleClass::Emergency => KEEP_CLEAR_M,
-                    _ => ALONGSIDE_M,
-                };
-                occupied |= n.front_s_m > extent.rear_s_m - behind_m
+                let emergency = n.class == VehicleClass::Emergency;
+                let behind_m = if emergency { KEEP_CLEAR_M } else { ALONGSIDE_M };
+                let there = n.front_s_m > extent.rear_s_m - behind_m
                     && n.rear_s_m < extent.front_s_m + ALONGSIDE_M;
+                occupied |= there;
+                kept_clear |= there && emergency;
                 if ahead { Role::TargetAhead } else { Role::TargetBehind }
             } else if ahead && in_lane(road, own, n, extent.width_m) {
                 Role::OwnAhead
@@ -152,20 +174,22 @@ impl Gate {
                 }
                 _ => SafeGap::new(&response, rss.brake_max_m_s2(n.class), grade_rad),
             };
-            concerns.push(Concern { role, neighbour: *n, safe });
+            let reaction_s = rss.behind(n.class).reaction_s;
+            concerns.push(Concern { role, neighbour: *n, reaction_s, safe });
         }
         Self {
             concerns: nearest_of_each_role(concerns),
             extent,
             reaction_s: response.reaction_s,
             occupied,
+            kept_clear,
         }
     }
 
-    /// A vehicle is alongside in the target lane.
+    /// A vehicle is alongside in the target lane, or one must pass there.
     #[must_use]
-    pub fn occupied(&self) -> bool {
-        self.occupied
+    pub fn occupied(&self, strictness: &Strictness) -> bool {
+        self.kept_clear || self.occupied && !strictness.from_entry
     }
 
     /// Whether the planned change is safe; otherwise the reason.
@@ -180,19 +204,32 @@ impl Gate {
         s_m: f64,
         strictness: &Strictness,
     ) -> Result<(), LaneChangeRefusal> {
-        if self.occupied {
+        if self.occupied(strictness) {
             return Err(LaneChangeRefusal::Occupied);
         }
         let mut time_s = 0.0;
         while time_s <= course.duration_s + self.reaction_s {
             let (v, travelled) = course.at(time_s);
             let d_m = path.at(road, s_m + travelled).d_m;
-            for c in &self.concerns {
+            let beside = strictness.from_entry && !self.enters(road, path, s_m, travelled);
+            for c in self.concerns.iter().filter(|c| c.role == Role::OwnAhead || !beside) {
                 self.check_one(c, time_s, v, travelled, d_m, strictness)?;
             }
             time_s += STEP_S;
         }
         Ok(())
+    }
+
+    /// Whether the tractor reaches into the lane that a path leads to once it has `travelled` from
+    /// `s_m`.
+    fn enters(&self, road: &Road, path: &LateralPath, s_m: f64, travelled: f64) -> bool {
+        road.lanes().get(usize::from(path.lane)).is_none_or(|track| {
+            let at_m = s_m + travelled;
+            let (at, centre_m) = (path.at(road, at_m), track.center_d_m(at_m));
+            let front_d_m = at.d_m + at.slope * (self.extent.front_s_m - s_m);
+            let reach_m = 0.5 * (track.width_m(at_m) + self.extent.width_m);
+            (centre_m - at.d_m).abs().min((centre_m - front_d_m).abs()) < reach_m
+        })
     }
 
     fn check_one(
@@ -204,7 +241,7 @@ impl Gate {
         d_m: f64,
         strictness: &Strictness,
     ) -> Result<(), LaneChangeRefusal> {
-        let (v_n, moved) = c.at(time_s);
+        let (v_n, moved) = c.at(time_s, strictness.yield_decel_m_s2);
         let n = &c.neighbour;
         let ahead_m = n.rear_s_m + moved - (self.extent.front_s_m + travelled);
         let behind_m = self.extent.rear_s_m + travelled - (n.front_s_m + moved);

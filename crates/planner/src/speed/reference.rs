@@ -14,8 +14,8 @@ pub(super) const STEP_M: f64 = 10.0;
 pub(super) const POINTS: usize = 51;
 /// Deceleration towards lower limits ahead, m/s².
 const APPROACH_DECEL_M_S2: f64 = 0.5;
-/// The truck stops so far before a lane's end, m.
-const STOP_BEFORE_END_M: f64 = 30.0;
+/// The truck stops so far before a lane's end, m: room to pull away and move over.
+const STOP_BEFORE_END_M: f64 = 45.0;
 
 /// What bounds the reference speed.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,8 +6,8 @@ use super::speed::{Ahead, Doing};
 use super::{Stack, grade, wrapped};
 use crate::SpeedPlannerKind;
 use crate::decider::{
-    DeciderKind, LaneChoice, View, keep_right, lane_ends, leave_ending_lane, leaving_gap_m, mobil,
-    observation, rules,
+    DeciderKind, LaneChoice, View, keep_right, lane_ends, lane_ends_in_m, leave_ending_lane,
+    leaving_gap_m, mobil, observation, rules,
 };
 use crate::pcc::horizon::LeadAhead;
 use crate::safety::RearResponse;
@@ -18,7 +18,7 @@ use crate::steering::{
     LOWEST_SPEED_M_S, Lateral, LateralPath, ManeuverPlanner, PREVIEW_POINTS, PREVIEW_STEP_S,
     PathError, Situation,
 };
-use road::{LaneEnd, LaneKind, Road};
+use road::{LaneKind, Road};
 use tractrix_core::{
     Command, EgoState, GearRequest, LaneChangeReason, Maneuver, PlanStatus, Scene, Time,
     VehicleLimits,
@@ -27,8 +27,6 @@ use tractrix_core::{
 /// Spacing of the published path, s, and its number of points.
 const PATH_STEP_S: f64 = 0.2;
 const PATH_POINTS: usize = 26;
-/// A truck so near to its lane's end is slowed by it, m: it waits for a gap.
-const WAITS_WITHIN_M: f64 = 300.0;
 /// Headway that a return to the right lane leaves a follower under MOBIL, s.
 const REAR_HEADWAY_S: f64 = 2.0;
 /// Time for joining a lane's centre from beside it, s.
@@ -279,9 +277,8 @@ impl Stack {
         let dt_s = self.config.rates.control_s();
         let speed = self.longitudinal.step(dt_s, ego, target, limits);
         let fenced = self.plans_ahead() && self.speed.last().is_some_and(|plan| plan.fenced);
-        let waits = road.lanes().get(usize::from(path.lane)).is_some_and(|lane| {
-            lane.end != LaneEnd::Continues && lane.s_end_m - ego.s_m < WAITS_WITHIN_M
-        });
+        // It wishes to leave a lane that ends: who still drives in it waits for a gap.
+        let waits = lane_ends_in_m(road, path.lane, ego.s_m).is_some();
         self.plan.held_up = speed.traffic_rules || fenced || waits || !doing.free;
         let gear = if self.plans_ahead() {
             if speed.traffic_rules {

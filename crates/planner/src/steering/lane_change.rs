@@ -21,6 +21,12 @@ const REARWARD_AMPLIFICATION: f64 = 1.15;
 const STEP_S: f64 = 0.25;
 /// The target lane must go on for so long after the change, s.
 const LANE_AFTER_S: f64 = 5.0;
+/// Speed below which the truck stands, m/s.
+pub(super) const STANDS_M_S: f64 = 0.3;
+/// Lengths of a change from standstill, m.
+const PULL_AWAY_M: [f64; 4] = [25.0, 30.0, 35.0, 20.0];
+/// Its acceleration, m/s²: what a loaded truck has in its low gears.
+const PULL_AWAY_M_S2: f64 = 0.5;
 
 /// Lane-change parameters.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -52,6 +58,9 @@ pub struct LaneChangeConfig {
     pub time_to_collision_s: f64,
     /// Abort limits, as multiples of the lateral acceleration and jerk limits.
     pub abort_factor: f64,
+    /// Where the truck's lane ends: deceleration with which those behind in the target lane are
+    /// counted on to let it in, m/s².
+    pub yield_decel_m_s2: f64,
 }
 
 impl Default for LaneChangeConfig {
@@ -70,6 +79,7 @@ impl Default for LaneChangeConfig {
             entry_gap_factor: 1.05,
             time_to_collision_s: 4.0,
             abort_factor: 1.5,
+            yield_decel_m_s2: 2.0,
         }
     }
 }
@@ -92,26 +102,30 @@ impl LaneChangeConfig {
         config_in("lane_change.cooldown_s", self.cooldown_s, 0.0, 60.0)?;
         config_in("lane_change.entry_gap_factor", self.entry_gap_factor, 1.0, 3.0)?;
         config_in("lane_change.time_to_collision_s", self.time_to_collision_s, 0.0, 20.0)?;
-        config_in("lane_change.abort_factor", self.abort_factor, 1.0, 3.0)
+        config_in("lane_change.abort_factor", self.abort_factor, 1.0, 3.0)?;
+        config_in("lane_change.yield_decel_m_s2", self.yield_decel_m_s2, 0.0, 4.0)
     }
 
-    /// Gaps asked for when a change starts.
+    /// Gaps asked for when a change starts at a speed, m/s; `lane_ends`: others must make room.
     #[must_use]
-    pub fn entry(&self) -> Strictness {
+    pub fn entry(&self, lane_ends: bool, start_m_s: f64) -> Strictness {
         Strictness {
             target_factor: self.entry_gap_factor,
             own_factor: 1.0,
             time_to_collision_s: self.time_to_collision_s,
+            yield_decel_m_s2: if lane_ends { self.yield_decel_m_s2 } else { 0.0 },
+            from_entry: lane_ends && start_m_s < self.speed_min_m_s,
         }
     }
 
     /// Gaps below which a change that is under way is no longer safe.
     #[must_use]
-    pub fn under_way(&self) -> Strictness {
+    pub fn under_way(&self, lane_ends: bool, start_m_s: f64) -> Strictness {
         Strictness {
             target_factor: 1.0,
             own_factor: 0.9,
             time_to_collision_s: 0.75 * self.time_to_collision_s,
+            ..self.entry(lane_ends, start_m_s)
         }
     }
 }
@@ -159,6 +173,8 @@ pub struct Start<'a> {
     pub path: &'a LateralPath,
     /// Reference speed, m/s: the end speed is not above it.
     pub reference_speed_m_s: f64,
+    /// The truck's lane ends so far ahead, m, and must be left.
+    pub lane_ends_in_m: Option<f64>,
     /// The road.
     pub road: &'a Road,
     /// The truck's limits.
@@ -177,20 +193,27 @@ pub fn plan_change(
     target: u16,
     gate: &Gate,
 ) -> Result<PlannedChange, LaneChangeRefusal> {
-    if gate.occupied() {
+    let v = start.ego.speed_m_s;
+    let strictness = config.entry(start.lane_ends_in_m.is_some(), v);
+    if gate.occupied(&strictness) {
         return Err(LaneChangeRefusal::Occupied);
     }
-    let v = start.ego.speed_m_s;
-    if v < config.speed_min_m_s {
-        return Err(LaneChangeRefusal::NoFeasiblePath);
-    }
+    let courses = match start.lane_ends_in_m {
+        _ if v >= config.speed_min_m_s => courses(config, v, start.reference_speed_m_s),
+        Some(_) => PULL_AWAY_M.map(|length_m| pulling_away(v, length_m)).into(),
+        None => Vec::new(),
+    };
+    let room_m = start.lane_ends_in_m.unwrap_or(f64::INFINITY);
     let mut refusal = None;
     let corridor = Corridor::new(start.road, start.path.lane, target);
-    for course in courses(config, v, start.reference_speed_m_s) {
-        let path = continued(start, target, course.at(course.duration_s).1);
+    for course in courses {
+        let length_m = course.at(course.duration_s).1;
+        if length_m > room_m {
+            continue;
+        }
+        let path = continued(start, target, length_m);
         // The gate first: it usually answers within its first instant
-        if let Err(reason) = gate.check(&course, &path, start.road, start.ego.s_m, &config.entry())
-        {
+        if let Err(reason) = gate.check(&course, &path, start.road, start.ego.s_m, &strictness) {
             refusal.get_or_insert(reason);
             continue;
         }
@@ -246,10 +269,21 @@ fn courses(config: &LaneChangeConfig, v: f64, reference_m_s: f64) -> Vec<SpeedCo
     list.into_iter().map(|(_, course)| course).collect()
 }
 
+/// Course of a truck that stands or crawls at its lane's end: it pulls away as it moves over.
+pub(super) fn pulling_away(v: f64, length_m: f64) -> SpeedCourse {
+    let end = libm::sqrt(v * v + 2.0 * PULL_AWAY_M_S2 * length_m.max(0.0));
+    SpeedCourse { start_m_s: v, end_m_s: end, duration_s: (end - v) / PULL_AWAY_M_S2 }
+}
+
 /// The path that leaves the present one without a jump and is on `lane`'s centre after `length_m`.
 fn continued(start: &Start<'_>, lane: u16, length_m: f64) -> LateralPath {
     let s_m = start.ego.s_m;
-    LateralPath::join(start.road, lane, start.path.at(start.road, s_m), s_m, length_m)
+    let mut from = start.path.at(start.road, s_m);
+    if start.ego.speed_m_s < STANDS_M_S {
+        // Who stands turns the wheels as they must be.
+        from.second_1_m = 0.0;
+    }
+    LateralPath::join(start.road, lane, from, s_m, length_m)
 }
 
 /// The outer edges of two lanes.

@@ -3,20 +3,34 @@
 //! it otherwise.
 
 use super::lane_change::{
-    LaneChangeConfig, PlannedChange, Start, plan_abort, plan_change, target_lane,
+    LaneChangeConfig, PlannedChange, STANDS_M_S, Start, plan_abort, plan_change, pulling_away,
+    target_lane,
 };
 use super::path::{LateralPath, lane_centre};
 use crate::LaneChoice;
+use crate::decider::lane_ends_in_m;
 use crate::safety::{Gate, GateView, RssConfig, SpeedCourse};
 use road::Road;
 use tractrix_core::{EgoState, LaneChangeRefusal, Maneuver, Scene, Time, VehicleLimits};
+
+/// Deceleration of a truck that stops again on its way out of a lane that ends, m/s².
+const WAITS_DECEL_M_S2: f64 = 0.8;
 
 /// What is being driven.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
     Keep,
-    Change { own: u16, choice: LaneChoice, course: SpeedCourse, began: Time },
-    Abort { target: u16 },
+    /// `waits`: pulling away at its lane's end, it stands inside its lane until the gap serves.
+    Change {
+        own: u16,
+        choice: LaneChoice,
+        course: SpeedCourse,
+        began: Time,
+        waits: bool,
+    },
+    Abort {
+        target: u16,
+    },
 }
 
 /// What the state machine looks at.
@@ -84,9 +98,12 @@ impl ManeuverPlanner {
     /// Planned speed, m/s, and acceleration, m/s², of a change under way.
     #[must_use]
     pub(crate) fn planned_speed(&self, now: Time) -> Option<(f64, f64)> {
-        let Phase::Change { course, began, .. } = self.phase else {
+        let Phase::Change { course, began, waits, .. } = self.phase else {
             return None;
         };
+        if waits {
+            return Some((0.0, -WAITS_DECEL_M_S2));
+        }
         let time_s = now.seconds_since(began).max(0.0);
         let accel = if time_s < course.duration_s { course.accel_m_s2() } else { 0.0 };
         Some((course.at(time_s).0, accel))
@@ -114,7 +131,7 @@ impl ManeuverPlanner {
         let PlannedChange { path, course } =
             plan_change(&self.config, &self.start(at), target, &gate)?;
         self.path = path;
-        self.phase = Phase::Change { own, choice, course, began: at.now };
+        self.phase = Phase::Change { own, choice, course, began: at.now, waits: false };
         Ok(())
     }
 
@@ -129,37 +146,60 @@ impl ManeuverPlanner {
             self.path = LateralPath::keep(self.path.lane);
             return None;
         }
-        let Phase::Change { own, course, began, .. } = self.phase else {
+        if matches!(self.phase, Phase::Abort { .. }) && at.ego.speed_m_s < STANDS_M_S {
+            // Its lane's end has stopped it: the way back is as far as it gets, and it may try again.
+            self.phase = Phase::Keep;
+        }
+        let Phase::Change { own, choice, course, began, waits } = self.phase else {
             return None;
         };
-        if !self.inside(own, at) {
+        let (s_m, v) = (at.ego.s_m, at.ego.speed_m_s);
+        let pulls_away = course.start_m_s < self.config.speed_min_m_s;
+        // A truck that pulls away can stop, another one must still be inside when it turns back.
+        let stops_m = if pulls_away { v * v / (2.0 * WAITS_DECEL_M_S2) } else { 0.0 };
+        let ahead_m = if pulls_away { at.limits.geometry.front_m } else { 0.0 };
+        if !self.inside(own, at, 0.5 * v + stops_m, ahead_m) && !waits {
             return None;
         }
         let target = self.path.lane;
         let time_s = at.now.seconds_since(began).max(0.0);
-        let rest = SpeedCourse {
-            start_m_s: at.ego.speed_m_s,
-            end_m_s: course.end_m_s,
-            duration_s: (course.duration_s - time_s).max(0.5),
+        let rest = if pulls_away {
+            pulling_away(v, self.path.offset.map_or(0.0, |q| q.end_s_m() - s_m))
+        } else {
+            let duration_s = (course.duration_s - time_s).max(0.5);
+            SpeedCourse { start_m_s: v, end_m_s: course.end_m_s, duration_s }
         };
         let gate = self.gate(at, own, target);
-        let verdict = gate.check(&rest, &self.path, at.road, at.ego.s_m, &self.config.under_way());
+        let lane_ends = lane_ends_in_m(at.road, own, at.ego.s_m).is_some();
+        let strictness = self.config.under_way(lane_ends, course.start_m_s);
+        let verdict = gate.check(&rest, &self.path, at.road, s_m, &strictness);
+        if pulls_away {
+            self.phase = match verdict {
+                Ok(()) if !waits => self.phase,
+                Ok(()) => Phase::Change { own, choice, course: rest, began: at.now, waits: false },
+                Err(_) => Phase::Change { own, choice, course, began, waits: true },
+            };
+            return verdict.err();
+        }
         let reason = verdict.err()?;
         self.path = plan_abort(&self.config, &self.start(at), own);
         self.phase = Phase::Abort { target };
         Some(reason)
     }
 
-    /// Whether the whole body is still inside a lane, and stays so for the next half second.
-    fn inside(&self, lane: u16, at: &Situation<'_>) -> bool {
+    /// Whether the body, from the reference point to `ahead_m`, is still inside a lane, and stays so
+    /// for the next `soon_m`.
+    fn inside(&self, lane: u16, at: &Situation<'_>, soon_m: f64, ahead_m: f64) -> bool {
         let Some(track) = at.road.lanes().get(usize::from(lane)) else {
             return false;
         };
         let s_m = at.ego.s_m;
-        let soon_m = 0.5 * at.ego.speed_m_s;
         let room = 0.5 * (track.width_m(s_m) - at.limits.geometry.width_m);
-        let off =
-            |s_m: f64| (self.path.at(at.road, s_m).d_m - lane_centre(at.road, lane, s_m).d_m).abs();
+        let off = |s_m: f64| {
+            let (is, centre) = (self.path.at(at.road, s_m), lane_centre(at.road, lane, s_m));
+            let off_m = is.d_m - centre.d_m;
+            off_m.abs().max((off_m + (is.slope - centre.slope) * ahead_m).abs())
+        };
         off(s_m) < room && off(s_m + soon_m) < room
     }
 
@@ -173,6 +213,7 @@ impl ManeuverPlanner {
             ego: at.ego,
             path: &self.path,
             reference_speed_m_s: at.reference_speed_m_s,
+            lane_ends_in_m: lane_ends_in_m(at.road, self.path.lane, at.ego.s_m),
             road: at.road,
             limits: at.limits,
         }

@@ -19,6 +19,10 @@ pub(super) const DECISION_TICKS: u64 = 5;
 const COOPERATES: f64 = 0.5;
 /// However little a change is needed yet, this part of the safe braking is accepted.
 const LEAST_DESIRE: f64 = 0.2;
+/// Room that is left behind the truck when it is let in, m.
+const ROOM_FOR_EGO_M: f64 = 3.0;
+/// Nobody changes into the lane that the truck needs so far behind it, m.
+const KEPT_M: f64 = 50.0;
 /// Two changes into one lane in the same tick start at least this far apart, m: the later one
 /// would decide on neighbours that are no longer right.
 const APART_M: f64 = 150.0;
@@ -33,6 +37,14 @@ pub(super) fn is_due(tick: u64, id: u64) -> bool {
 struct Need {
     side: usize,
     distance_m: f64,
+}
+
+/// The lane that the ego has to get into, and where it is, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct EgoNeed {
+    lane: u16,
+    rear_m: f64,
+    front_m: f64,
 }
 
 /// A driver and the changes that would pay or are needed: side, lane, incentive, m/s².
@@ -79,8 +91,8 @@ impl Engine {
 
     /// How much a change is needed, 0 to 1: it grows from where drivers begin to think of it to the
     /// point where it must be done (LMRS, Eq. 4, by distance).
-    fn desire(&self, need: &Need) -> f64 {
-        (1.0 - need.distance_m / self.config.mandatory_ahead_m).clamp(0.0, 1.0)
+    fn desire(&self, distance_m: f64) -> f64 {
+        (1.0 - distance_m / self.config.mandatory_ahead_m).clamp(0.0, 1.0)
     }
 
     /// Part of their gap that drivers are content with at a desire (LMRS, Eq. 7).
@@ -97,7 +109,7 @@ impl Engine {
             return;
         }
         let Some(need) = self.need(i) else { return };
-        let desire = self.desire(&need);
+        let desire = self.desire(need.distance_m);
         if desire < COOPERATES {
             return;
         }
@@ -118,6 +130,47 @@ impl Engine {
         }
     }
 
+    /// Where the ego needs room, if its lane ends: others let it in as anybody.
+    pub(super) fn ego_need(&self) -> Option<EgoNeed> {
+        let span = self.ego.spans().iter().find(|span| self.map.ends_early(span.lane))?;
+        let distance_m = self.map.lanes[span.lane as usize].s_end_m - span.front_m;
+        let (left, right) = self.map.beside(span.lane, span.front_m);
+        let goes_on = |&lane: &u16| {
+            lane != NO_LANE && self.map.is_open_to(lane, NO_LANE) && !self.map.ends_early(lane)
+        };
+        let lane = [left, right].into_iter().find(goes_on)?;
+        let needed = self.desire(distance_m) >= COOPERATES && self.ego.in_lane(lane).is_none();
+        needed.then_some(EgoNeed { lane, rear_m: span.rear_m, front_m: span.front_m })
+    }
+
+    /// The first driver behind the ego in the lane that it needs who can stay behind it comfortably
+    /// lets it in: the driver and the acceleration not to exceed, m/s².
+    pub(super) fn let_ego_in(&self) -> Option<(usize, f64)> {
+        let need = self.ego_need?;
+        let (fleet, most) = (&self.state.fleet, self.config.yield_decel_m_s2);
+        let rear_m = need.rear_m - ROOM_FOR_EGO_M;
+        let needed = |i: usize| {
+            let closing = (fleet.v_m_s[i] - self.ego.speed_m_s).max(0.0);
+            let room_m = rear_m - fleet.s_m[i];
+            if room_m > 0.0 { closing * closing / (2.0 * room_m) } else { f64::INFINITY }
+        };
+        let can_stay_behind = |&i: &usize| fleet.occupies(i, need.lane) && needed(i) <= most;
+        let f = (0..fleet.len()).rev().find(can_stay_behind)?;
+        let seen = (rear_m, self.ego.speed_m_s);
+        let taken = self.behind_that_m_s2(f, seen, fleet.mind[f].headway_frac);
+        let follows = fleet.driver[f].idm.lesser_m_s2(self.free_m_s2(f, need.lane), taken);
+        // Braking that is put off until more is needed than one gives would come to nothing.
+        let in_time = if needed(f) > 0.5 * most { -needed(f) } else { f64::INFINITY };
+        Some((f, follows.min(in_time).max(-most)))
+    }
+
+    /// Whether a lane at a station is kept free for the ego.
+    fn is_kept_for_ego(&self, lane: u16, s_m: f64) -> bool {
+        self.ego_need.is_some_and(|need| {
+            need.lane == lane && s_m > need.rear_m - KEPT_M && s_m < need.front_m + ROOM_FOR_EGO_M
+        })
+    }
+
     /// What driver `i` would do about his lane in this tick.
     pub(super) fn wish(&self, i: usize) -> Option<Wish> {
         let fleet = &self.state.fleet;
@@ -127,7 +180,7 @@ impl Engine {
         }
         let options = match self.need(i) {
             Some(need) => {
-                let possible = self.change_m_s2(i, need.side, Some(self.desire(&need)));
+                let possible = self.change_m_s2(i, need.side, Some(self.desire(need.distance_m)));
                 [possible.map(|(lane, _)| (need.side, lane, f64::INFINITY)), None]
             }
             None => [LEFT, RIGHT].map(|side| {
@@ -202,7 +255,7 @@ impl Engine {
         if lane == NO_LANE || !self.map.is_open_to(lane, fleet.driver[i].exit) {
             return None;
         }
-        if self.keeps_out(i, lane) {
+        if self.keeps_out(i, lane) || self.is_kept_for_ego(lane, s) {
             return None;
         }
         let to = &self.map.lanes[lane as usize];

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use driver_models::{Idm, ballistic};
 
 use super::boundary::Boundary;
-use super::changes::{DECISION_TICKS, is_due};
+use super::changes::{DECISION_TICKS, EgoNeed, is_due};
 use super::config::{ClassConfig, TrafficConfig};
 use super::driver::Driver;
 use super::ego::EgoSpans;
@@ -97,6 +97,8 @@ pub(crate) struct Engine {
     pub(crate) boundary: Option<Arc<Boundary>>,
     /// How other drivers expect the ego to follow.
     pub(super) ego_driver: Idm,
+    /// Where the ego needs room at this tick.
+    pub(super) ego_need: Option<EgoNeed>,
     pub(super) minds: Minds,
     /// Who does the pieces of a tick, and how many vehicles a piece has.
     pub(super) workers: Arc<dyn Workers>,
@@ -139,6 +141,7 @@ impl Engine {
             boundary: None,
             workers: Arc::new(InTurn),
             piece: PIECE,
+            ego_need: None,
             ego_driver: Idm::new(25.0, 1.5, 3.0, 0.6, 1.5, 6.0),
             limit_m_s: f64::INFINITY,
             blocks: Vec::new(),
@@ -150,6 +153,7 @@ impl Engine {
     pub(crate) fn decide(&mut self) {
         self.look_beyond();
         self.happen();
+        self.ego_need = self.ego_need();
         let workers = Arc::clone(&self.workers);
         let piece = self.piece;
         self.find_neighbours(&*workers, piece);
@@ -163,7 +167,7 @@ impl Engine {
             }
             bounds
         });
-        for (i, most_m_s2) in all_bounds.into_iter().flatten() {
+        for (i, most_m_s2) in all_bounds.into_iter().flatten().chain(self.let_ego_in()) {
             raw[i] = raw[i].min(most_m_s2);
         }
         self.raw_a_m_s2 = raw;
@@ -241,7 +245,17 @@ impl Engine {
 
     /// The same for another headway, as a part of the driver's own.
     pub(super) fn behind_at_m_s2(&self, i: usize, leader: u32, lane: u16, frac: f64) -> f64 {
-        let Some((rear_m, speed_m_s)) = self.rear_and_speed(leader, lane) else { return 0.0 };
+        let seen = self.rear_and_speed(leader, lane);
+        seen.map_or(0.0, |seen| self.behind_that_m_s2(i, seen, frac))
+    }
+
+    /// The same behind somebody whose rear is there, m, and who has that speed, m/s.
+    pub(super) fn behind_that_m_s2(
+        &self,
+        i: usize,
+        (rear_m, speed_m_s): (f64, f64),
+        frac: f64,
+    ) -> f64 {
         let fleet = &self.state.fleet;
         let (v, idm) = (fleet.v_m_s[i], &fleet.driver[i].idm);
         let (gap_m, closing_m_s) = fleet.mind[i].sees(rear_m - fleet.s_m[i], v - speed_m_s);
