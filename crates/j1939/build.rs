@@ -51,7 +51,7 @@ fn si(unit: &str) -> Result<Unit, String> {
         "rad/s" => Unit("_rad_s", "rad/s", 1.0, 0.0),
         "%/rpm" => Unit("_s_rad", "s/rad", 0.01 * 60.0 / TAU, 0.0),
         "km/h" => Unit("_m_s", "m/s", 1.0 / 3.6, 0.0),
-        "m/s2" => Unit("_m_s2", "m/s²", 1.0, 0.0),
+        "m/s2" => Unit("_m_s2", "m/s2", 1.0, 0.0),
         "km" => Unit("_m", "m", 1e3, 0.0),
         "m" => Unit("_m", "m", 1.0, 0.0),
         "cm" => Unit("_m", "m", 1e-2, 0.0),
@@ -65,11 +65,11 @@ fn si(unit: &str) -> Result<Unit, String> {
         "degC" => Unit("_k", "K", 1.0, 273.15),
         "kg" => Unit("_kg", "kg", 1.0, 0.0),
         "kg/h" => Unit("_kg_s", "kg/s", 1.0 / 3_600.0, 0.0),
-        "kg m2" => Unit("_kg_m2", "kg m²", 1.0, 0.0),
+        "kg m2" => Unit("_kg_m2", "kg m2", 1.0, 0.0),
         "Nm" => Unit("_nm", "N m", 1.0, 0.0),
-        "l" => Unit("_m3", "m³", 1e-3, 0.0),
-        "l/h" => Unit("_m3_s", "m³/s", 1e-3 / 3_600.0, 0.0),
-        "km/l" => Unit("_m_m3", "m/m³", 1e6, 0.0),
+        "l" => Unit("_m3", "m3", 1e-3, 0.0),
+        "l/h" => Unit("_m3_s", "m3/s", 1e-3 / 3_600.0, 0.0),
+        "km/l" => Unit("_m_m3", "m/m3", 1e6, 0.0),
         "V" => Unit("_v", "V", 1.0, 0.0),
         "A" => Unit("_a", "A", 1.0, 0.0),
         other => return Err(format!("signals.csv: no SI unit for {other:?}")),
@@ -122,7 +122,7 @@ fn read(folder: &Path) -> Result<Vec<Message>, Box<dyn Error>> {
             start_bit: 8 * (byte - 1) + bit - 1,
             length_bits: cell(5)?.parse()?,
             scale: scale * factor,
-            offset: offset * factor + zero,
+            offset: if zero == 0.0 { offset * factor } else { hundredths(offset + zero) },
             data_max: optional(cell(9)?)?,
             is_code: cell(8)?.is_empty(),
         };
@@ -133,6 +133,11 @@ fn read(folder: &Path) -> Result<Vec<Message>, Box<dyn Error>> {
         message.signals.push(signal);
     }
     Ok(messages)
+}
+
+/// Degrees Celsius have their zero at 273.15 K: the sum without the noise of its last bits.
+fn hundredths(kelvin: f64) -> f64 {
+    (kelvin * 100.0).round() / 100.0
 }
 
 fn optional(cell: &str) -> Result<Option<u32>, std::num::ParseIntError> {

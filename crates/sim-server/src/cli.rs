@@ -20,6 +20,8 @@ pub(crate) enum Command {
     Run(Box<cmd::run::Args>),
     /// Plans the fuel-optimal speed of a whole trip, against cruise control.
     Plan(Box<cmd::plan::Args>),
+    /// Prints what a log of a J1939 bus says, signal by signal.
+    Decode(cmd::decode::Args),
     /// Finds what the simulation gets wrong on measured drives, and why.
     Diagnose(Box<cmd::diagnose::Args>),
     /// Plans measurements: which manoeuvres tell causes apart.

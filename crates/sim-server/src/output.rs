@@ -1,6 +1,6 @@
 //! What the program prints: the only module that writes to stdout and stderr.
 
-use std::io::{ErrorKind, Write};
+use std::io::{BufWriter, ErrorKind, StdoutLock, Write};
 use std::path::Path;
 
 use crate::failure::Failure;
@@ -27,5 +27,49 @@ pub(crate) fn result(text: &str) -> Result<(), Failure> {
             Err(Failure::writing(Path::new("standard output"), &e))
         }
         _ => Ok(()),
+    }
+}
+
+/// Many lines of results, on stdout. A closed pipe is the reader's choice, not a failure.
+pub(crate) struct Lines {
+    stdout: BufWriter<StdoutLock<'static>>,
+    nobody_reads: bool,
+}
+
+impl Lines {
+    pub(crate) fn new() -> Self {
+        Self { stdout: BufWriter::new(std::io::stdout().lock()), nobody_reads: false }
+    }
+
+    /// Whether the reader has closed the pipe.
+    pub(crate) const fn nobody_reads(&self) -> bool {
+        self.nobody_reads
+    }
+
+    /// Writes whole lines.
+    ///
+    /// # Errors
+    /// [`Failure::Work`] when stdout goes into a file on a full disk.
+    pub(crate) fn write(&mut self, lines: &str) -> Result<(), Failure> {
+        let written = self.stdout.write_all(lines.as_bytes());
+        self.check(written)
+    }
+
+    /// Writes what is still in memory.
+    ///
+    /// # Errors
+    /// As [`Lines::write`].
+    pub(crate) fn flush(&mut self) -> Result<(), Failure> {
+        let written = self.stdout.flush();
+        self.check(written)
+    }
+
+    fn check(&mut self, written: std::io::Result<()>) -> Result<(), Failure> {
+        match written {
+            Err(e) if e.kind() == ErrorKind::BrokenPipe => self.nobody_reads = true,
+            Err(e) => return Err(Failure::writing(Path::new("standard output"), &e)),
+            Ok(()) => {}
+        }
+        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub(crate) mod decode;
 pub(crate) mod diagnose;
 pub(crate) mod experiment;
 pub(crate) mod map;
@@ -22,6 +23,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         None => run::run(&run::Args::parse_from(["run"])),
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Plan(args)) => plan::run(&args),
+        Some(Command::Decode(args)) => decode::run(&args),
         Some(Command::Diagnose(args)) => diagnose::run(&args),
         Some(Command::Experiment(command)) => experiment::run(&command),
         Some(Command::Traffic(args)) => traffic::run(&args),
