@@ -6,7 +6,9 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/freestanding"
 
 target=${CARGO_TARGET_DIR:-../../target}/freestanding
-CARGO_TARGET_DIR=$target cargo build -q --release --locked
+# the versions of the workspace; cargo leaves out what is not needed here
+cp ../../Cargo.lock Cargo.lock
+CARGO_TARGET_DIR=$target cargo build -q --release
 cc -nostdlib -static -ffreestanding -Wl,--gc-sections \
   -Wl,--defsym=memcpy=0,--defsym=memmove=0,--defsym=memset=0,--defsym=memcmp=0,--defsym=bcmp=0 \
   -o "$target/freestanding" "$target/release/libfreestanding.a"
