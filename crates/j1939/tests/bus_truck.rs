@@ -14,6 +14,15 @@ fn of(frames: &[Frame], pgn: u32, da: u8) -> impl Iterator<Item = &Frame> {
     frames.iter().filter(move |f| f.id().pgn() == pgn && f.id().da() == da)
 }
 
+/// Ticks until a condition holds; its time, at most `most` of them.
+fn until(yard: &mut Yard, most: usize, condition: impl Fn(&Yard) -> bool) -> Option<Time> {
+    (0..most).find_map(|_| {
+        let at = yard.now;
+        yard.tick();
+        condition(yard).then_some(at)
+    })
+}
+
 fn count(frames: &[Frame], pgn: u32, da: u8) -> usize {
     of(frames, pgn, da).count()
 }
@@ -161,9 +170,9 @@ fn a_silent_engine_is_noticed_within_100_ms_and_the_truck_stops() {
     let mut yard = Yard::engaged();
     yard.controllers.silent.push(0x00);
     let last = yard.now.plus_nanos(-TICK);
-    let noticed = yard
-        .until(20, |y| y.truck.status().since(VehicleFault::SignalLost).is_some())
-        .expect("it was not noticed");
+    let noticed =
+        until(&mut yard, 20, |y| y.truck.status().since(VehicleFault::SignalLost).is_some())
+            .expect("it was not noticed");
     assert!(noticed.seconds_since(last) < 0.1, "{}", noticed.seconds_since(last));
     assert_eq!(yard.truck.engagement(), Engagement::MinimalRisk);
     let status = yard.truck.status();
@@ -186,7 +195,7 @@ fn a_spoofed_command_is_noticed_in_the_next_tick_and_not_forgotten() {
     let at = yard.now;
     let spoof = Frame::of(Id::from_raw(0x0C00_000B), [0xC1, 0, 0, 0xFA, 0xFF, 0xFF, 0xFF, 0xFF]);
     yard.stranger.send(at, &spoof).unwrap();
-    let noticed = yard.until(10, |y| y.truck.status().since(VehicleFault::Spoofed).is_some());
+    let noticed = until(&mut yard, 10, |y| y.truck.status().since(VehicleFault::Spoofed).is_some());
     assert!(noticed.unwrap().seconds_since(at) <= 0.02);
     assert_eq!(yard.truck.engagement(), Engagement::MinimalRisk);
     yard.run(10.0);
@@ -205,8 +214,9 @@ fn a_claim_with_name_zero_is_an_intruder() {
         let mut yard = Yard::engaged();
         let at = yard.now;
         yard.stranger.send(at, &Name(0).claim(address)).unwrap();
-        let seen =
-            yard.until(10, |y| y.truck.status().since(VehicleFault::AddressConflict).is_some());
+        let seen = until(&mut yard, 10, |y| {
+            y.truck.status().since(VehicleFault::AddressConflict).is_some()
+        });
         assert!(seen.unwrap().seconds_since(at) <= 0.02, "{address:02X}");
         assert_eq!(yard.truck.engagement(), Engagement::MinimalRisk);
     }

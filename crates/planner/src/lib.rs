@@ -9,6 +9,7 @@
 //! | [`steering`] | lane-change planning and manoeuvres, paths, the lateral controller |
 //! | [`speed`] | reference speed, car following, the longitudinal controller, the load estimator |
 //! | [`safety`] | safe gaps, the gate before a lane change, the guard before the vehicle |
+//! | [`localise`] | the pose from wheel speed, yaw rate and satellites |
 //! | [`pcc`] | predictive cruise control: the fuel-optimal speed over a trip or a horizon |
 //!
 //! Without default features the crate is `no_std + alloc` and needs no solver. It plans with what a
@@ -21,6 +22,7 @@ extern crate std;
 pub mod decider;
 mod drive;
 mod error;
+pub mod localise;
 pub mod pcc;
 pub mod safety;
 pub mod speed;
@@ -35,3 +37,8 @@ pub use drive::{DriveError, TickOutcome, drive_tick};
 pub use error::PlannerError;
 pub use speed::SpeedProfile;
 pub use stack::{RatesConfig, SpeedPlannerKind, Stack, StackConfig};
+
+/// Angle in -pi..pi.
+pub(crate) fn wrapped(angle_rad: f64) -> f64 {
+    libm::remainder(angle_rad, 2.0 * core::f64::consts::PI)
+}

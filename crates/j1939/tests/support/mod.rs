@@ -266,13 +266,4 @@ impl Yard {
             })
             .collect()
     }
-
-    /// Ticks until a condition holds; its time, at most `most` of them.
-    pub fn until(&mut self, most: usize, condition: impl Fn(&Self) -> bool) -> Option<Time> {
-        (0..most).find_map(|_| {
-            let at = self.now;
-            self.tick();
-            condition(self).then_some(at)
-        })
-    }
 }

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::speed::{Ahead, Doing};
-use super::{Stack, grade, wrapped};
+use super::{Stack, grade};
 use crate::SpeedPlannerKind;
 use crate::decider::{
     DeciderKind, LaneChoice, View, keep_right, lane_ends, lane_ends_in_m, leave_ending_lane,
@@ -18,6 +18,7 @@ use crate::steering::{
     LOWEST_SPEED_M_S, Lateral, LateralPath, ManeuverPlanner, PREVIEW_POINTS, PREVIEW_STEP_S,
     PathError, Situation,
 };
+use crate::wrapped;
 use road::{LaneKind, Road};
 use tractrix_core::{
     Command, EgoState, GearRequest, LaneChangeReason, Maneuver, PlanStatus, Scene, Time,

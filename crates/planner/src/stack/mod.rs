@@ -319,8 +319,3 @@ fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
     let rear = road.at(ego.s_m - g.rear_m(), 0.0).z_m;
     libm::atan((front - rear) / length)
 }
-
-/// Angle in -pi..pi.
-fn wrapped(angle_rad: f64) -> f64 {
-    libm::remainder(angle_rad, 2.0 * core::f64::consts::PI)
-}
