@@ -1,7 +1,20 @@
-//! Entry points of `j1939` that must link where there is nothing: no standard library, no allocator,
+//! Entry points of `j1939` and the planner's guard that must link where there is nothing: no standard library, no allocator,
 //! and a panic handler that ends in a symbol that does not exist. If this links, no input can make
 //! them panic. Nobody runs it.
 #![no_std]
+
+extern crate alloc;
+
+// The guard is private to the planner, whose other parts may allocate: its source alone is built.
+#[allow(dead_code, unused_imports)]
+#[path = "../../../crates/planner/src/error.rs"]
+mod error;
+#[allow(dead_code)]
+#[path = "../../../crates/planner/src/safety/guard.rs"]
+mod guard;
+
+use error::PlannerError;
+use guard::{GuardConfig, GuardInput, GuardMemory};
 
 use core::hint::black_box;
 
@@ -14,7 +27,7 @@ use j1939::{
     Acknowledgment, AddressClaim, BitRate, BusLoad, Frame, Id, MessageTable, Name, Request, Slot, TpEvent,
     Transport, frame_bits, ident,
 };
-use tractrix_core::{Stamped, Time};
+use tractrix_core::{EgoState, Stamped, Time, VehicleLimits, VehicleStatus};
 
 unsafe extern "C" {
     /// Nowhere defined.
@@ -187,4 +200,24 @@ pub extern "C" fn _start() {
     }
     codec(id, bytes);
     lists_and_texts(id, bytes);
+}
+
+/// What a tick of the guard is given.
+pub struct Tick {
+    config: GuardConfig,
+    memory: GuardMemory,
+    now: Time,
+    ego: Option<Stamped<EgoState>>,
+    status: VehicleStatus,
+    scene_time: Option<Time>,
+    input: GuardInput,
+    limits: VehicleLimits,
+}
+
+/// A tick of the guard.
+#[unsafe(no_mangle)]
+pub extern "C" fn guard_tick(tick: &Tick) {
+    let Tick { config, memory, now, ego, status, scene_time, input, limits } = tick;
+    black_box(guard::inspect(config, memory, *now, ego.as_ref(), status, *scene_time));
+    black_box(guard::limit(config, memory, input, limits));
 }
