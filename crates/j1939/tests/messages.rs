@@ -1,6 +1,6 @@
 //! The generated messages: numbers in SI, states, lengths, and what cannot be sent.
 
-use j1939::message::{Ccvs1, Ec1, Eec1, Etc2, Tsc1, Vdc2, Xbr};
+use j1939::message::{Ccvs1, Ec1, Eec1, Eec2, Etc2, Tsc1, Vdc2, Vdhr, Xbr};
 use j1939::{GLOBAL_ADDRESS, Id, J1939Error, Message, MessageTable, Slot};
 
 const EEC1: Id = Id::from_raw(0x0CF0_0400);
@@ -83,4 +83,19 @@ fn a_table_is_found_by_its_group() {
     assert_eq!(Eec1::TABLE.period_ms, Some(10));
     assert_eq!(MessageTable::of(61_443).unwrap().name, "EEC2");
     assert_eq!(MessageTable::of(60_928), None);
+}
+
+#[test]
+fn what_looks_like_a_state_and_is_none_is_a_value() {
+    // A cab that does not know its distance sends the largest valid one; a load may pass 100 %.
+    let id = Id::from_raw(0x18FE_C131);
+    let distance = Vdhr::decode(id, &[0xFF, 0xFF, 0xFF, 0xFA, 0xFF, 0xFF, 0xFF, 0xFF]).unwrap();
+    assert_eq!(distance.total_distance_m, Slot::Value(f64::from(0xFAFF_FFFF_u32) * 5.0));
+    assert_eq!(distance.trip_distance_m, Slot::NotAvailable);
+    let id = Id::from_raw(0x0CF0_0300);
+    let pedal = Eec2::decode(id, &[0xD1, 0xFB, 127, 0xFF, 0xFF, 0x0F, 0xFE, 0xFC]).unwrap();
+    assert_eq!(pedal.load_frac, Slot::Value(1.27));
+    assert_eq!(pedal.accelerator_pedal_frac, Slot::ParameterSpecific(0xFB));
+    assert_eq!(pedal.torque_available_frac, Slot::Error(0xFE));
+    assert_eq!(pedal.pumping_torque_frac, Slot::Reserved(0xFC));
 }

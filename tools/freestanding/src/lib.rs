@@ -18,14 +18,14 @@ use guard::{GuardConfig, GuardInput, GuardMemory};
 
 use core::hint::black_box;
 
+use j1939::bus::{Bus, BusError};
 use j1939::check::{Carrier, Checker, Policy, Sealer};
 use j1939::dm::{self, DiagnosticMessage, Dtc, Lamps};
 use j1939::message::{self, MESSAGES, Message, Tsc1, Xbr};
 use j1939::steering::{ExampleSteering, SteeringDemand, SteeringLink};
-use j1939::bus::{Bus, BusError};
 use j1939::{
-    Acknowledgment, AddressClaim, BitRate, BusLoad, Frame, Id, MessageTable, Name, Request, Slot, TpEvent,
-    Transport, frame_bits, ident,
+    Acknowledgment, AddressClaim, BitRate, BusLoad, Frame, Id, MessageTable, Name, Request, Slot,
+    TpEvent, Transport, frame_bits, ident,
 };
 use tractrix_core::{EgoState, Stamped, Time, VehicleLimits, VehicleStatus};
 
