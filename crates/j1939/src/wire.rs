@@ -95,7 +95,7 @@ impl BusLoad {
     /// An idle bus.
     #[must_use]
     pub const fn new(rate: BitRate) -> Self {
-        Self { rate, busy_bits: [0; SLICES], slice: 0 }
+        Self { rate, busy_bits: [0; SLICES], slice: i64::MIN }
     }
 
     /// Counts a frame that ended at `now`. A time that goes back counts as the latest one.

@@ -50,8 +50,7 @@ fn a_sheet_is_not_made_of_a_wrong_truck_or_over_another_file() {
 #[test]
 fn what_the_contract_names_and_this_version_lacks_says_so() {
     for option in [
-        &["--vehicle", "bus"][..],
-        &["--vehicle", "can:can0"],
+        &["--vehicle", "can:can0"][..],
         &["--vehicle", "socketcand:localhost:29536/can0"],
         &["--ros2"],
         &["--foxglove"],

@@ -49,6 +49,9 @@ pub enum SimError {
     /// The traffic source failed.
     #[error(transparent)]
     Traffic(#[from] traffic_client::TrafficError),
+    /// The virtual truck's control units cannot go on.
+    #[error(transparent)]
+    Ecu(#[from] crate::ecu::EcuError),
     /// Another failure of the loop.
     #[error("{0}")]
     Drive(String),

@@ -7,10 +7,13 @@
 //!
 //! Left out on purpose: clocks and pacing, sockets, files other than scenarios, roads and trucks.
 
+mod bus_loop;
 mod collision;
 mod drivability;
+pub mod ecu;
 mod error;
 mod ghost;
+mod in_step;
 mod lead;
 mod memory;
 mod metrics;
@@ -27,10 +30,12 @@ mod traffic_section;
 mod truck;
 mod world;
 
+pub use bus_loop::{BusFigures, BusLoop, End};
 pub use collision::{Footprint, footprints_overlap};
 pub use drivability::{Drivability, Drive, Spread};
 pub use error::SimError;
 pub use ghost::{Ghost, GhostReport};
+pub use in_step::in_step;
 pub use lead::LeadVehicle;
 pub use memory::{MemoryRecord, MemoryRecorder};
 pub use metrics::{Metrics, Summary};

@@ -6,7 +6,8 @@ use planner::safety::{RearResponse, RssConfig, SafeGap};
 use road::{LaneKind, Road};
 use serde::Serialize;
 use tractrix_core::{
-    EgoState, Geometry, Maneuver, Recorder, Tick, Time, VehicleClass, VehicleLimits,
+    EgoState, Geometry, Maneuver, Neighbour, Recorder, Scene, Tick, Time, VehicleClass,
+    VehicleLimits,
 };
 
 use crate::{Footprint, footprints_overlap};
@@ -184,19 +185,12 @@ impl Metrics {
     /// Gap, time to collision and safe gap to the vehicle ahead in the ego's swept lane.
     fn watch_headway(&mut self, tick: &Tick<'_>) {
         let ego = tick.ego;
-        let front_m = ego.s_m + self.geometry.front_m;
-        let ahead = tick
-            .scene
-            .neighbours
-            .iter()
-            .filter(|n| n.rear_s_m > ego.s_m)
-            .filter(|n| (n.d_m - ego.d_m).abs() < 0.5 * (n.width_m + self.geometry.width_m))
-            .min_by(|a, b| a.rear_s_m.total_cmp(&b.rear_s_m));
+        let ahead = nearest_ahead(ego, &self.geometry, tick.scene);
         let Some(ahead) = ahead else {
             self.rss_below = false;
             return;
         };
-        let gap_m = ahead.rear_s_m - front_m;
+        let gap_m = ahead.rear_s_m - (ego.s_m + self.geometry.front_m);
         let closing_m_s = ego.speed_m_s - ahead.speed_m_s;
         if closing_m_s > 0.1 {
             self.min_ttc_s = self.min_ttc_s.min((gap_m / closing_m_s).max(0.0));
@@ -269,6 +263,20 @@ impl Metrics {
             }
         }
     }
+}
+
+/// The nearest vehicle ahead in the ego's swept way.
+pub(crate) fn nearest_ahead<'a>(
+    ego: &EgoState,
+    geometry: &Geometry,
+    scene: &'a Scene,
+) -> Option<&'a Neighbour> {
+    scene
+        .neighbours
+        .iter()
+        .filter(|n| n.rear_s_m > ego.s_m)
+        .filter(|n| (n.d_m - ego.d_m).abs() < 0.5 * (n.width_m + geometry.width_m))
+        .min_by(|a, b| a.rear_s_m.total_cmp(&b.rear_s_m))
 }
 
 const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;

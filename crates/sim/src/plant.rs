@@ -4,9 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dynamics::{TruckModel, TruckParameters};
+use j1939::bus::Bus;
 use road::Road;
-use tractrix_core::{Time, Vehicle};
+use tractrix_core::{Plan, Recorder, Tick, Time, TrafficSource, Vehicle};
 
+use crate::ecu::{Ahead, EcuConfig, EcuSim};
 use crate::{Metrics, OffRoad, Scenario, SimError, SimTruck, Status, Summary, Traffic};
 
 /// A truck of the simulation, however it is commanded.
@@ -77,6 +79,42 @@ impl Plant<SimTruck> {
             tick_ns: Time::from_seconds(scenario.run.tick_s).0,
             status: Status::Running,
         })
+    }
+}
+
+impl<B: Bus> Plant<EcuSim<B>> {
+    /// The virtual truck of a scenario on a bus whose time begins at zero. Truck and traffic are
+    /// held until somebody asks the truck to do something.
+    ///
+    /// # Errors
+    /// As [`crate::World::new`].
+    pub fn on_bus(scenario: &Scenario, seed: u64, bus: B) -> Result<Self, SimError> {
+        let plant = Plant::build(scenario, seed, None)?;
+        let ecu = EcuSim::new(plant.truck.clone(), bus, EcuConfig::default(), Time::ZERO, None)?;
+        Ok(plant.map_truck(|_| ecu))
+    }
+
+    /// One tick: moves the control units to bus time `now`, and once the truck is let go truck and
+    /// traffic by one tick of the scenario. After the end it does nothing.
+    ///
+    /// # Errors
+    /// [`SimError`] when the bus, the truck or the traffic source fails.
+    pub fn tick(&mut self, now: Time) -> Result<Status, SimError> {
+        let ego = self.truck.advance(now)?.value;
+        if self.status != Status::Running || self.truck.let_go().is_none() {
+            return Ok(self.status);
+        }
+        let scene = self.traffic.advance(self.now, &ego)?;
+        let plan = Plan::default();
+        self.metrics.record(&Tick { now: self.now, ego: &ego, scene, plan: &plan });
+        let geometry = self.truck.sim().limits().geometry;
+        self.truck.see(Ahead::of(&ego, &geometry, scene));
+        Ok(self.end_tick())
+    }
+
+    /// The control units.
+    pub const fn ecu(&self) -> &EcuSim<B> {
+        &self.truck
     }
 }
 

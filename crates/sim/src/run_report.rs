@@ -4,7 +4,7 @@ use serde::Serialize;
 use tractrix_core::Provenance;
 use traffic_client::Mode;
 
-use crate::{Arrivals, GhostReport, Status, Summary, TickTime, World};
+use crate::{Arrivals, BusFigures, GhostReport, Status, Summary, TickTime, World};
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -64,6 +64,9 @@ pub struct RunReport {
     saving_frac: Option<f64>,
     /// The comparison with the ghost; none where none drove along.
     pub ghost: Option<GhostReport>,
+    /// How the bus between stack and truck did; none where the stack reaches the truck directly.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bus: Option<BusFigures>,
     missed_deadlines: u64,
     tick_time_us: TickTime,
     pace: String,
@@ -110,6 +113,7 @@ impl RunReport {
             pace: wall.pace,
             wall_time_s: wall.wall_time_s,
             realtime_factor: summary.duration_s / wall.wall_time_s.max(1e-9),
+            bus: world.bus(),
             saving_frac: ghost.and_then(|ghost| ghost.saving_frac),
             ghost,
             summary,

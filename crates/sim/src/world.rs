@@ -4,12 +4,16 @@ use std::path::Path;
 use std::sync::Arc;
 
 use dynamics::TruckModel;
+use j1939::BitRate;
+use j1939::bus::Bus;
 use planner::{RatesConfig, Stack, StackConfig};
 use road::Road;
-use tractrix_core::{Geometry, Recorder, Tick, Time, Vehicle};
+use tractrix_core::{Geometry, Recorder, Scene, Tick, Time, Vehicle};
 
+use crate::ecu::Ahead;
 use crate::{
-    Ghost, GhostReport, Metrics, Plant, Scenario, SimError, SimTruck, Summary, Traffic, Truck,
+    BusFigures, BusLoop, Ghost, GhostReport, Metrics, Plant, Scenario, SimError, SimTruck, Summary,
+    Traffic, Truck,
 };
 
 /// Whether a run goes on.
@@ -37,17 +41,21 @@ pub struct World {
     sensors: bool,
 }
 
-/// Measures a tick, unless sensors change the scene: then [`World::tick`] measures it with the scene
-/// as it is, because what a truck does not see it can still hit.
+/// Measures a tick, unless the stack gets another state or scene than the true ones: then
+/// [`World::tick`] measures it with these, because what a truck does not see it can still hit.
 struct Judge<'a> {
     metrics: &'a mut Metrics,
-    sensors: bool,
+    measures: bool,
+    /// The scene, for who measures afterwards.
+    scene: Option<Scene>,
 }
 
 impl Recorder for Judge<'_> {
     fn record(&mut self, tick: &Tick<'_>) {
-        if !self.sensors {
+        if self.measures {
             self.metrics.record(tick);
+        } else {
+            self.scene = Some(tick.scene.clone());
         }
     }
 }
@@ -117,7 +125,8 @@ impl World {
         }
         let (now, road) = (self.plant.now(), self.plant.limited_road());
         let Plant { truck, traffic, metrics, .. } = &mut self.plant;
-        let mut judge = Judge { metrics, sensors: self.sensors };
+        let measures = !self.sensors && !matches!(truck, Truck::Bus(_));
+        let mut judge = Judge { metrics, measures, scene: None };
         let outcome = planner::drive_tick(
             now,
             truck,
@@ -127,9 +136,11 @@ impl World {
             &mut (&mut judge, recorder),
         )
         .map_err(SimError::from)?;
-        if let (true, Some(scene)) = (self.sensors, traffic.truth()) {
-            let (ego, plan) = (&outcome.ego.value, self.stack.plan());
-            metrics.record(&Tick { now, ego, scene, plan });
+        let seen = judge.scene;
+        if let Some(scene) = traffic.truth().or(seen.as_ref()).filter(|_| !measures) {
+            let ego = *truck.truth().unwrap_or(&outcome.ego.value);
+            metrics.record(&Tick { now, ego: &ego, scene, plan: self.stack.plan() });
+            truck.see(Ahead::of(&ego, &truck.limits().geometry, scene));
         }
         if let Some(ghost) = &mut self.ghost {
             ghost.follow(now, self.plant.truck().state(), self.stack.plan().held_up);
@@ -148,6 +159,49 @@ impl World {
             self.ghost = Some(Box::new(ghost));
         }
         Ok(())
+    }
+
+    /// Puts a bus in memory between stack and truck, before the first tick.
+    ///
+    /// # Errors
+    /// As [`BusLoop::loopback`].
+    pub fn put_on_loopback(&mut self, rate: BitRate) -> Result<(), SimError> {
+        let looped = BusLoop::loopback(self.truck().clone(), rate)?;
+        self.plant.truck = Truck::Bus(Box::new(looped));
+        Ok(())
+    }
+
+    /// Puts a bus that somebody else has between stack and truck, before the first tick: a
+    /// connection for each end.
+    ///
+    /// # Errors
+    /// As [`BusLoop::over`].
+    pub fn put_on_bus(
+        &mut self,
+        rate: BitRate,
+        ecu: Box<dyn Bus + Send>,
+        driver: Box<dyn Bus + Send>,
+    ) -> Result<(), SimError> {
+        let looped = BusLoop::over(self.truck().clone(), rate, ecu, driver)?;
+        self.plant.truck = Truck::Bus(Box::new(looped));
+        Ok(())
+    }
+
+    /// The bus between stack and truck, if there is one.
+    pub fn bus_mut(&mut self) -> Option<&mut BusLoop> {
+        match &mut self.plant.truck {
+            Truck::Bus(looped) => Some(looped),
+            Truck::Direct(_) | Truck::Detached(_) => None,
+        }
+    }
+
+    /// How the bus between stack and truck did so far, if there is one.
+    #[must_use]
+    pub fn bus(&self) -> Option<BusFigures> {
+        match &self.plant.truck {
+            Truck::Bus(looped) => Some(looped.figures()),
+            Truck::Direct(_) | Truck::Detached(_) => None,
+        }
     }
 
     /// The ghost and how the truck compares with it, if one drives along.

@@ -47,8 +47,9 @@ pub(crate) struct Args {
     /// Who sets the reference speed: cruise or predictive.
     #[arg(long)]
     speed_planner: Option<String>,
-    /// How the stack reaches the truck: direct; bus, can and socketcand are not supported yet.
-    #[arg(long, default_value = "direct")]
+    /// How the stack reaches the truck: direct, or bus (J1939 in memory); can and socketcand are not
+    /// supported yet.
+    #[arg(long, default_value = "direct", value_parser = vehicle)]
     vehicle: String,
     /// Ends the run after this simulated time.
     #[arg(long, value_name = "S", value_parser = positive)]
@@ -86,6 +87,15 @@ pub(crate) struct Args {
     /// Foxglove WebSocket; not supported yet.
     #[arg(long)]
     foxglove: bool,
+}
+
+/// A way to the truck.
+fn vehicle(text: &str) -> Result<String, String> {
+    match text.split_once(':') {
+        None if ["direct", "bus"].contains(&text) => Ok(text.to_owned()),
+        Some(("can" | "socketcand", _)) => Ok(text.to_owned()),
+        _ => Err("direct, bus, can:IFACE or socketcand:HOST:PORT/IFACE".to_owned()),
+    }
 }
 
 /// Runs the command.

@@ -9,7 +9,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use planner::decider::DeciderKind;
 use recording::{Combination, Geodesy, Recording, RunHeader, Scenery};
 use road::Road;
-use sim::{EndReason, GhostReport, RunReport, Scenario, TrafficKind, WallClock, World};
+use sim::{BusFigures, EndReason, GhostReport, RunReport, Scenario, TrafficKind, WallClock, World};
 use tokio::sync::Notify;
 use tractrix_core::Vehicle;
 
@@ -38,7 +38,8 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
         TrafficKind::Sumo => out.begin("sumo")?,
         _ => out.path().join("sumo"),
     };
-    let world = World::in_folder(scenario, seed, &sumo).map_err(Failure::input)?;
+    let mut world = World::in_folder(scenario, seed, &sumo).map_err(Failure::input)?;
+    super::options::connect(&mut world, &args.vehicle)?;
     warn_of_road(world.road());
     let (provenance, started) = (Provenance::of_seed(seed), unix_time());
     let combination = Combination::new(world.truck().limits());
@@ -235,7 +236,7 @@ fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) -> Result<(
     let litres_per_100_km = s.fuel_g / DIESEL_G_PER_L / (s.distance_m * 1e-5).max(1e-9);
     output::result(&format!(
         "{:.2} km in {:.1} s, {:.1} km/h, {:.2} kg fuel ({litres_per_100_km:.1} l/100 km), \
-         {} collisions, {} lane changes, lateral error at most {:.3} m, guard {} ticks{}\n{}",
+         {} collisions, {} lane changes, lateral error at most {:.3} m, guard {} ticks{}{}\n{}",
         s.distance_m * 1e-3,
         s.duration_s,
         s.mean_speed_m_s * 3.6,
@@ -245,6 +246,7 @@ fn report(as_json: bool, run: &RunReport, json: &str, folder: &Path) -> Result<(
         s.max_lateral_error_m,
         s.guard_activations,
         run.ghost.as_ref().map_or_else(String::new, against_ghost),
+        run.bus.as_ref().map_or_else(String::new, over_bus),
         folder.display(),
     ))
 }
@@ -267,6 +269,17 @@ fn against_ghost(ghost: &GhostReport) -> String {
         ));
     }
     text
+}
+
+/// How the bus between stack and truck did.
+fn over_bus(bus: &BusFigures) -> String {
+    format!(
+        "\nover a bus at 250 kbit/s: load {:.1} % in the busiest second, {} ticks not driven, \
+         {} demands refused",
+        100.0 * bus.peak_load_frac,
+        bus.ticks_not_driven,
+        bus.refused
+    )
 }
 
 /// Density of diesel fuel, g/l (EN 590, middle of 820 to 845).

@@ -1,6 +1,7 @@
 //! From options to the scenario that is driven.
 
-use sim::{Overrides, Scenario};
+use j1939::BitRate;
+use sim::{Overrides, Scenario, World};
 
 use super::Args;
 use crate::failure::Failure;
@@ -31,17 +32,23 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
 
 /// What the contract names and this version does not do.
 fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
-    match args.vehicle.split_once(':').map_or(&*args.vehicle, |(kind, _)| kind) {
-        "direct" => {}
-        "bus" | "can" | "socketcand" => {
-            return Err(Failure::unsupported(&format!("--vehicle {}", args.vehicle)));
-        }
-        _ => return Err(Failure::Input(format!("--vehicle {}: expected direct", args.vehicle))),
-    }
     for (asked, flag) in [(args.ros2, "--ros2"), (args.foxglove, "--foxglove")] {
         if asked {
             return Err(Failure::unsupported(flag));
         }
     }
     Ok(())
+}
+
+/// Reaches the truck as `--vehicle` says: directly, or over a bus in memory.
+///
+/// # Errors
+/// [`Failure::Input`] names a bus that cannot be used.
+pub(super) fn connect(world: &mut World, vehicle: &str) -> Result<(), Failure> {
+    let rate = BitRate::Kbit250;
+    match vehicle {
+        "direct" => Ok(()),
+        "bus" => world.put_on_loopback(rate).map_err(Failure::work),
+        name => Err(Failure::unsupported(&format!("--vehicle {name}"))),
+    }
 }
