@@ -74,10 +74,11 @@ pub(crate) enum P {
     StiffnessFollowsMass,
     TurboStart,
     SteerDelay,
+    BrakeLoad,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 65;
+pub(crate) const PARAMS: usize = 66;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -184,6 +185,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::StiffnessFollowsMass, "stiffness_follows_load", "1", (1.0, 0.0, 1.0, 0.1), 0.0, 0.0),
     s(P::TurboStart, "threshold_offset_frac", "1", (0.1, -0.3, 0.4, 0.02), 0.0, 0.0),
     s(P::SteerDelay, "pure_delay_frac", "1", (0.5, 0.0, 1.0, 0.1), 0.0, 0.0),
+    s(P::BrakeLoad, "load_estimate_scale", "1", (0.15, -0.6, 1.5, 0.02), 0.15, 0.0),
 ];
 
 impl Spec {

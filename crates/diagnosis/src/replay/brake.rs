@@ -1,5 +1,6 @@
 //! Brake pressure from the deceleration demand: dead time, first-order lag, rate limits. The brake
-//! controller scales its demand with the reported mass.
+//! controller scales its demand with a load that it weighs itself on every trip: near the reported
+//! mass, or near the true one where that differs.
 
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
@@ -17,11 +18,9 @@ pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
         .iter()
         .enumerate()
         .map(|(k, ok)| {
-            if !ok {
-                chambers.pressure_kpa = 0.0;
-                return 0.0;
-            }
-            (2 * k..2 * k + 2).map(|i| 0.5 * (d.pressure[i] - chambers.step(i))).sum()
+            let mean: f64 =
+                (2 * k..2 * k + 2).map(|i| 0.5 * (d.pressure[i] - chambers.step(i))).sum();
+            if *ok { mean } else { 0.0 }
         })
         .collect()
 }
@@ -55,6 +54,7 @@ struct Chambers<'a> {
     d: &'a Prepared,
     brake: &'a BrakeParameters,
     table: Option<Curve>,
+    load_kg: f64,
     delay: f64,
     pressure_kpa: f64,
 }
@@ -67,10 +67,12 @@ pub(super) const PA_PER_KPA: f64 = 1e3;
 impl<'a> Chambers<'a> {
     fn new(d: &'a Prepared, plant: &'a Plant, t: &Theta) -> Self {
         let brake = &plant.truck.brake;
+        let load_kg = d.mass_kg * (1.0 + t[P::BrakeLoad as usize]);
         Self {
             d,
             brake,
-            table: brake.pressure_table(d.mass_kg).ok().flatten(),
+            table: brake.pressure_table(load_kg).ok().flatten(),
+            load_kg,
             delay: (brake.dead_time_s + t[P::BrakeDelay as usize]) / Drive::STEP_S,
             pressure_kpa: 0.0,
         }
@@ -78,7 +80,7 @@ impl<'a> Chambers<'a> {
 
     fn step(&mut self, i: usize) -> f64 {
         let decel_m_s2 = at_index(&self.d.xbr, i as f64 - self.delay);
-        let demand_pa = self.brake.demand_pa(decel_m_s2, self.d.mass_kg, self.table.as_ref());
+        let demand_pa = self.brake.demand_pa(decel_m_s2, self.load_kg, self.table.as_ref());
         let mut pressure_pa = self.pressure_kpa * PA_PER_KPA;
         if pressure_pa != demand_pa {
             for _ in 0..SUBSTEPS {

@@ -193,7 +193,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::TorqueReport => &[G::Torque],
         P::ShiftTime => &[G::Shift],
         P::FuelLow | P::FuelLowLoad | P::FuelLowOver | P::FuelScale | P::FuelLag => &[G::Fuel],
-        P::BrakeDelay => &[G::Brake],
+        P::BrakeDelay | P::BrakeLoad => &[G::Brake],
         P::SpeedScale => &[G::Force, G::Lateral, G::Gps, G::Altitude, G::Imu],
         P::YawBias => &[G::Lateral, G::Heading],
         P::SteerRatio

@@ -105,12 +105,16 @@ impl GradeBySection {
     }
 }
 
-/// Indicated torque up to which a message of 1 % a bit with its noise may be one of an engine that
-/// is cut off, percent of the reference torque.
+/// Indicated torque up to which a message of 1 % a bit with its noise may be zero, percent of the
+/// reference torque: what burns no more than this is not judged.
 const CUT_OFF_PERCENT: f64 = 2.5;
 /// Torque above which nobody brakes, percent, and samples until brakes that were on are off.
 const PULLS: f64 = 3.0;
 const RELEASE: i32 = 30;
+
+/// Samples after which a pressure that rests under a demand that rests says nothing new: a truck
+/// that is held for an hour repeats the rounding of one message.
+const RESTS: usize = 20;
 
 /// Samples kept away from a shift on either side.
 const SHIFT_MARGIN: usize = 12;
@@ -296,25 +300,34 @@ impl Prepared {
             });
         }
         if self.has(&[C::XbrDecelMS2, C::BrakePressureKpa]) {
-            let active: Vec<bool> = (0..n)
+            let tells: Vec<bool> = (0..n)
                 .map(|i| {
-                    let from = i.saturating_sub(30);
-                    (from..=i).any(|j| self.xbr[j] > 0.0 || self.pressure[j] > 0.0)
+                    let since = |samples: usize| i.saturating_sub(samples)..=i;
+                    let held = since(RESTS).all(|j| {
+                        self.pressure[j] == self.pressure[i] && self.xbr[j] == self.xbr[i]
+                    });
+                    !held && since(30).any(|j| self.xbr[j] > 0.0 || self.pressure[j] > 0.0)
                 })
                 .collect();
-            valid[M::Brake as usize] = rows(M::Brake, &|a, b| (a..b).all(|i| active[i]));
+            valid[M::Brake as usize] = rows(M::Brake, &|a, b| (a..b).all(|i| tells[i]));
         }
         if self.has(&[C::ShiftInProcess]) {
             valid[M::Shift as usize] = vec![true; self.shifts.len()];
         }
         if self.has(&[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm]) {
+            let reference_nm = plant.truck.engine.reference_torque_nm;
+            let least_nm = 0.01 * CUT_OFF_PERCENT * reference_nm;
+            let least_g_s: Vec<f64> = self
+                .rpm
+                .iter()
+                .map(|rpm| plant.engine.fuel_rate_g_s(rpm / RPM_PER_RAD_S, least_nm))
+                .collect();
             valid[M::Fuel as usize] = rows(M::Fuel, &|a, b| {
-                // no fuel at all is the overrun cut-off of the engine control, not its map, and
-                // within the torque message's noise of zero it cannot be told from idling along
-                (a..b).all(|i| {
-                    let burns = self.fuel[i] > 0.0 && self.torque[i] > CUT_OFF_PERCENT;
-                    self.engaged[i] && self.speed[i] > 3.0 && burns
-                })
+                // No fuel at all is the overrun cut-off of the engine control, not its map, and
+                // near zero the torque message is cut at zero. Judged by the fuel: rows chosen by
+                // a noisy torque are rows whose noise has one sign.
+                (a..b)
+                    .all(|i| self.engaged[i] && self.speed[i] > 3.0 && self.fuel[i] > least_g_s[i])
             });
         }
         if self.has(&[C::SteeringWheelRad]) {

@@ -108,3 +108,47 @@ fn every_effect_of_the_truck_file_is_in_the_balance() {
         assert!(without > 2.0 * whole, "{path}: {without} m/s, with it {whole} m/s");
     }
 }
+
+/// A stuck truck once stood for an hour on its brakes: the rounding of one pressure message, 63,000
+/// times the same, was an effect outside the catalogue. And its controller weighs the truck itself,
+/// so that a load lighter than its sheet is no fault of the brakes.
+#[test]
+fn brakes_that_are_held_say_it_once_and_a_load_of_their_own_is_a_tolerance() {
+    const LOAD: f64 = 0.88;
+    let truck = TruckParameters::load("reference").unwrap();
+    let (n, reported_kg) = (3_600 * 20, 40_000.0);
+    let demand = |i: usize| match i {
+        0..40 => 0.0,
+        40..100 => 1.5,
+        100..71_000 => 0.8,
+        _ => 0.0,
+    };
+    let brake = &truck.brake;
+    let dead = (brake.dead_time_s / Drive::STEP_S).round() as usize;
+    let mut pressure_pa = 0.0;
+    let pressures_kpa = (0..n).map(|i| {
+        let asked_pa = brake.demand_pa(demand(i.saturating_sub(dead)), LOAD * reported_kg, None);
+        for _ in 0..10 {
+            pressure_pa = brake.pressure_step_pa(pressure_pa, asked_pa, Drive::STEP_S / 10.0);
+        }
+        (pressure_pa / 4e3).round() * 4.0
+    });
+    let mut drive = Drive::new("held", 0.0, n);
+    drive.reported_mass_kg = Some(reported_kg);
+    drive.set(C::BrakePressureKpa, pressures_kpa.collect());
+    drive.set(C::XbrDecelMS2, (0..n).map(demand).collect());
+
+    let plant = Plant::of_truck(&truck).unwrap();
+    let d = Prepared::new(&drive, &plant);
+    let rows = d.valid[M::Brake as usize].iter().filter(|ok| **ok).count();
+    assert!((60..150).contains(&rows), "{rows} rows");
+    let worst_kpa = |load_estimate| {
+        let mut theta = [0.0; PARAMS];
+        theta[P::BrakeLoad as usize] = load_estimate;
+        let mut out = Residuals::default();
+        replay_group(&d, &plant, &theta, Group::Brake, &mut out);
+        out[M::Brake as usize].iter().fold(0.0_f64, |worst, x| worst.max(x.abs()))
+    };
+    assert!(worst_kpa(LOAD - 1.0) < 2.5, "{} kPa", worst_kpa(LOAD - 1.0));
+    assert!(worst_kpa(0.0) > 9.0, "{} kPa", worst_kpa(0.0));
+}
