@@ -90,7 +90,7 @@ fn a_command_arrives_as_it_was_meant() {
     let engine = Tsc1::decode(engine.id(), engine.bytes()).unwrap();
     let p = limits().powertrain;
     let asked_nm = torque_asked(&engine).unwrap() * ENGINE_NM;
-    assert!((p.pedal_frac(asked_nm, 120.0) - 0.4).abs() < 1e-3, "{asked_nm}");
+    assert!((p.pedal_frac(asked_nm, 20.0 / 0.53 * 2.85) - 0.4).abs() < 1e-3, "{asked_nm}");
     let xbr = of(&frames, Xbr::TABLE.pgn, 0x0B).last().unwrap();
     let (decel, mode) = brakes_asked(&Xbr::decode(xbr.id(), xbr.bytes()).unwrap());
     assert!((decel - 1.25).abs() < 0.5 / 2048.0 + 1e-9);
@@ -263,6 +263,30 @@ fn brakes_that_take_no_demand_are_not_relied_on() {
         assert_eq!(yard.truck.engagement(), Engagement::MinimalRisk);
         assert!(yard.truck.status().since(VehicleFault::NotReady).is_some());
     }
+}
+
+/// The truck slows down, its wheel speed does not.
+#[test]
+fn a_frozen_wheel_speed_is_noticed_by_the_engine_s() {
+    let mut yard = Yard::engaged();
+    let first = yard.now;
+    let noticed = (0..600).find_map(|_| {
+        yard.controllers.measured.engine_speed_rad_s *= 1.0 - 0.5 * 0.01 / 20.0;
+        yard.tick();
+        let lost = yard.truck.status().since(VehicleFault::SignalLost).is_some();
+        lost.then(|| yard.now.seconds_since(first))
+    });
+    let noticed_s = noticed.expect("it was not noticed");
+    assert!(noticed_s < 3.0, "{noticed_s} s at 0.5 m/s²");
+    assert_eq!(yard.truck.status().age_s(SafetySignal::RoadSpeed), Some(f64::INFINITY));
+    assert_eq!(yard.truck.engagement(), Engagement::MinimalRisk);
+    // Not in a shift, and not with an open driveline
+    let mut yard = Yard::engaged();
+    yard.controllers.measured.driveline_engaged = 0;
+    yard.run(0.1);
+    yard.controllers.measured.engine_speed_rad_s = 63.0;
+    yard.run(2.0);
+    assert_eq!(yard.truck.engagement(), Engagement::Engaged);
 }
 
 #[test]

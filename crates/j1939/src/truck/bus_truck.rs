@@ -18,6 +18,8 @@ use crate::{AddressClaim, BitRate, J1939Error, TpEvent, Transport};
 
 /// Frames that are taken from the bus in one tick; what is beyond waits for the next.
 const FRAMES_A_TICK: usize = 4096;
+/// So long wheel speed and engine speed may contradict each other (gears are told at 10 Hz), s.
+const CONTRADICTED_S: f64 = 0.3;
 /// Between two ticks no more time passes than this, s, unless the clock jumps.
 const TICK_MAX_S: f64 = 0.5;
 
@@ -58,6 +60,7 @@ pub struct BusTruck<B, P, S = ExampleSteering> {
     pose_told: [Option<Time>; 2],
     commanded: Command,
     wheel_off: Option<Time>,
+    contradicted: Option<Time>,
     fuel_used_g: f64,
     fuel_until: Option<Time>,
     status: VehicleStatus,
@@ -96,6 +99,7 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
             pose_told: [None; 2],
             commanded: Command::default(),
             wheel_off: None,
+            contradicted: None,
             fuel_used_g: 0.0,
             fuel_until: None,
             status: VehicleStatus::default(),
@@ -203,8 +207,12 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
         }
     }
 
-    /// Age of a signal, s; infinite if it never came.
+    /// Age of a signal, s; infinite if it never came, or if others contradict it.
     fn age_s(&self, signal: SafetySignal, now: Time) -> f64 {
+        let wrong = |since| now.seconds_since(since) >= CONTRADICTED_S;
+        if signal == SafetySignal::RoadSpeed && self.contradicted.is_some_and(wrong) {
+            return f64::INFINITY;
+        }
         let time = match signal {
             SafetySignal::Pose => self.last_pose.map(|pose| pose.time),
             other => self.heard.time_of(other),
@@ -241,6 +249,8 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
 
     /// Status and engagement of this tick.
     fn judge(&mut self, now: Time, clock_jumped: bool) {
+        let contradicts = self.heard.speed_contradicts(&self.limits.powertrain);
+        self.contradicted = contradicts.then(|| self.contradicted.unwrap_or(now));
         let mut status = VehicleStatus::default();
         let mut fresh = self.heard.reference_nm.is_some_and(|nm| nm.value > 0.0) && !clock_jumped;
         for signal in SafetySignal::ALL {

@@ -55,8 +55,8 @@ pub struct BusTruckConfig {
 impl Default for BusTruckConfig {
     fn default() -> Self {
         Self {
-            // Arbitrary address capable, on-highway, function 0 reserved for cruise control's kin
-            name: Name(0xA000_1D00_0000_0001),
+            // Can take another address, on-highway, function 14 (cruise control), no maker's number
+            name: Name(0x9000_0E00_0000_0001),
             address: 0x27,
             claim_delay_steps: 0,
             engine: 0x00,

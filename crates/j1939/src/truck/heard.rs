@@ -1,6 +1,6 @@
 //! The latest of every signal that driving needs, with the time at which it came.
 
-use tractrix_core::{Fix, SafetySignal, Stamped, Time};
+use tractrix_core::{Fix, PowertrainLimits, SafetySignal, Stamped, Time};
 
 use super::{BusTruckConfig, Torque};
 use crate::message::{
@@ -290,6 +290,29 @@ impl Heard {
             SafetySignal::Pedals => time(self.accelerator_frac),
             SafetySignal::Pose => None,
         }
+    }
+}
+
+/// Wheels and engine may differ by tyres, slip and filters: m/s, and as a share.
+const SPEED_TOLERANCE: (f64, f64) = (0.5, 0.03);
+/// Below this speed clutches slip, m/s.
+const CLUTCH_CLOSED_FROM_M_S: f64 = 5.0;
+
+impl Heard {
+    /// Whether the wheel speed is another than the engine's through the closed driveline: it is
+    /// frozen, or one of both is wrong.
+    pub(super) fn speed_contradicts(&self, limits: &PowertrainLimits) -> bool {
+        let (Some(speed), Some(engine), Some(gear), Some(closed)) =
+            (self.speed_m_s, self.engine_speed_rad_s, self.gear, self.driveline_closed)
+        else {
+            return false;
+        };
+        let ratio = usize::try_from(gear.value - 1).ok().and_then(|i| limits.gear_ratios.get(i));
+        let Some(ratio) = ratio.filter(|_| closed.value && !self.shifting) else { return false };
+        let driven_m_s = engine.value * limits.wheel_radius_m / (ratio * limits.final_drive_ratio);
+        let (least, share) = SPEED_TOLERANCE;
+        driven_m_s.max(speed.value) > CLUTCH_CLOSED_FROM_M_S
+            && (driven_m_s - speed.value).abs() > least + share * driven_m_s
     }
 }
 

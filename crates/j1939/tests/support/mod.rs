@@ -47,6 +47,7 @@ pub struct Measured {
     pub gear: i16,
     pub retarder_frac: f64,
     pub xbr_state: u8,
+    pub driveline_engaged: u8,
 }
 
 impl Default for Measured {
@@ -56,7 +57,8 @@ impl Default for Measured {
             yaw_rate_rad_s: 0.0,
             steering_wheel_rad: 0.0,
             accel_y_m_s2: 0.0,
-            engine_speed_rad_s: 120.0,
+            // 20 m/s in the direct gear
+            engine_speed_rad_s: 20.0 / 0.53 * 2.85,
             engine_torque_nm: 800.0,
             friction_nm: 150.0,
             fuel_m3_s: 8e-6,
@@ -65,6 +67,7 @@ impl Default for Measured {
             gear: 12,
             retarder_frac: 0.0,
             xbr_state: 0,
+            driveline_engaged: 1,
         }
     }
 }
@@ -120,7 +123,7 @@ impl Controllers {
         };
         self.put(now, &eec1, 0x00);
         let etc1 = Etc1 {
-            driveline_engaged: Slot::Value(1),
+            driveline_engaged: Slot::Value(self.measured.driveline_engaged),
             shift_in_process: Slot::Value(0),
             ..Etc1::default()
         };
