@@ -12,6 +12,7 @@ use crate::fault::Fault;
 pub(crate) struct Decision {
     time_s: f64,
     maneuver: String,
+    reason: Option<String>,
     refusal: Option<String>,
     speed_status: String,
     reference_speed_m_s: f64,
@@ -34,6 +35,7 @@ impl Decision {
         Ok(Self {
             time_s: time.seconds(),
             maneuver: word(&plan.maneuver)?,
+            reason: plan.reason.as_ref().map(word).transpose()?,
             refusal: plan.refusal.as_ref().map(word).transpose()?,
             speed_status: word(&plan.speed_status)?,
             reference_speed_m_s: plan.reference_speed_m_s,

@@ -235,6 +235,25 @@ def test_ego_decision_and_scene_tell_one_tick() -> None:
     assert summary["fuel_g"] == ego.fuel_used_g
 
 
+def test_a_lane_change_says_why_it_is_wished_and_why_it_is_not_driven() -> None:
+    world = tractrix.World("flat", decider="external", traffic="none")
+    world.step(100)
+    assert world.decision is not None
+    assert (world.decision.reason, world.decision.refusal) == (None, None)
+    world.request_lane_change("right")
+    # Wishes are looked at ten times a second.
+    seen = set()
+    for _ in range(10):
+        world.step()
+        seen.add((world.decision.reason, world.decision.refusal))
+    assert ("requested", "no_target_lane") in seen
+    world.request_lane_change("left")
+    world.step(200)
+    decision = world.decision
+    assert (decision.maneuver, decision.reason) == ("change_left", "requested")
+    assert decision.refusal is None
+
+
 def test_sensors_hide_from_the_stack_what_truth_shows() -> None:
     scenario = tractrix.scenario("dense-15")
     scenario["traffic"]["perception"] |= {"enabled": True, "dropout_frac": 1.0}

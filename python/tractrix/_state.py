@@ -79,6 +79,9 @@ class Decision(NamedTuple):
     """Time of the tick, s."""
     maneuver: str
     """`keep_lane`, `change_left`, `change_right`, `abort_change` or `minimal_risk`."""
+    reason: str | None
+    """Why a lane change is wished, driven or refused: `lane_ends`, `slower_ahead`, `keep_right`,
+    `policy` or `requested`."""
     refusal: str | None
     """Why a lane change that was wished is not driven: `no_target_lane`, `unsafe_front`, ..."""
     speed_status: str
