@@ -5,18 +5,24 @@ use std::sync::Arc;
 use dynamics::effects::resistance::air_above;
 use dynamics::{DynamicsError, RoadPatch, SUBSTEP_S, TruckModel, TruckState};
 use road::{LaneKind, Road};
-use tractrix_core::{Command, EgoState, Stamped, Time, Vehicle, VehicleLimits};
+use tractrix_core::{Command, Curve, EgoState, Stamped, Time, Vehicle, VehicleLimits};
 
 use crate::{EgoStart, SimError, Weather};
 
+/// Change of the retarder's share that is told.
+const RETARDER_STEP_FRAC: f64 = 0.01;
+
 /// A truck model on a road. A command given at `k` acts until the next one: reading the truck at a
-/// later time first moves the plant there.
+/// later time first moves the plant there. Its limits are those of now: a hot retarder gives less.
 #[derive(Debug, Clone)]
 pub struct SimTruck {
     model: Arc<TruckModel>,
     road: Arc<Road>,
     weather: Weather,
     limits: VehicleLimits,
+    /// Force of the cold retarder, and the share of it that [`Self::limits`] tell.
+    cold_retarder_n: Option<Curve>,
+    retarder_left_frac: f64,
     plant: TruckState,
     ego: EgoState,
     command: Command,
@@ -76,6 +82,8 @@ impl SimTruck {
             model,
             road,
             weather: weather.clone(),
+            cold_retarder_n: limits.powertrain.retarder_force_n.clone(),
+            retarder_left_frac: 1.0,
             limits,
             plant,
             ego: EgoState { s_m: start.s_m, d_m, ..EgoState::default() },
@@ -124,6 +132,17 @@ impl SimTruck {
         }
     }
 
+    /// Tells what the retarder has left, as its control unit does.
+    fn tell_retarder(&mut self) {
+        let left_frac = self.model.retarder_left_frac(&self.plant);
+        if (left_frac - self.retarder_left_frac).abs() > RETARDER_STEP_FRAC
+            && let Some(cold_n) = &self.cold_retarder_n
+        {
+            self.retarder_left_frac = left_frac;
+            self.limits.powertrain.retarder_force_n = Some(cold_n.scaled(left_frac));
+        }
+    }
+
     /// Refreshes the reported state from the plant.
     fn observe(&mut self) {
         let hint = self.ego.s_m;
@@ -147,6 +166,7 @@ impl Vehicle for SimTruck {
                 self.model.step(&self.plant, &self.command, &self.patch(), steps * SUBSTEP_S)?;
             self.time = self.time.plus_nanos(Time::from_seconds(steps * SUBSTEP_S).0);
             self.observe();
+            self.tell_retarder();
         }
         Ok(Stamped { time: self.time, value: self.model.measured(&self.ego) })
     }

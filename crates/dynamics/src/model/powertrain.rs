@@ -196,13 +196,19 @@ impl TruckModel {
         s.engine_brake_nm +=
             (brake_target - s.engine_brake_nm) * (SUBSTEP_S / p.engine_brake_lag_s).min(1.0);
         let d = &self.parameters.driveline;
-        let left = |c: &CoolingParameters| c.retarder_left_frac(s.coolant_k);
-        let left_frac = self.parameters.cooling.as_ref().map_or(1.0, left);
-        let retarder_target = retarder * left_frac * d.retarder_limit_nm(s.speed_m_s);
+        let available_nm = self.retarder_left_frac(s) * d.retarder_limit_nm(s.speed_m_s);
+        let retarder_target = retarder * available_nm;
         s.retarder_nm = d.retarder_step_nm(s.retarder_nm, retarder_target, SUBSTEP_S);
         let burning = if s.shift.phase == ShiftPhase::Open { holding } else { s.engine_torque_nm };
         s.fuel_rate_g_s = e.fuel_rate_g_s(n, burning);
         s.fuel_g += s.fuel_rate_g_s * SUBSTEP_S;
+    }
+
+    /// Share of the retarder's torque that its coolant leaves, 0 to 1.
+    #[must_use]
+    pub fn retarder_left_frac(&self, s: &TruckState) -> f64 {
+        let left = |c: &CoolingParameters| c.retarder_left_frac(s.coolant_k);
+        self.parameters.cooling.as_ref().map_or(1.0, left)
     }
 
     /// Clutch, gears, wheels: force of the driveline, and the engine's speed when it is free.

@@ -273,6 +273,12 @@ impl Stack {
         if !self.ticks.is_multiple_of(u64::from(self.config.rates.decision_ticks)) {
             return;
         }
+        let retarder_n = &limits.powertrain.retarder_force_n;
+        if let Some(known) = &mut self.estimated
+            && known.powertrain.retarder_force_n != *retarder_n
+        {
+            known.powertrain.retarder_force_n.clone_from(retarder_n);
+        }
         let estimate = self.estimator.estimate();
         let planned_kg =
             self.estimated.as_ref().map_or(limits.road_load.mass_kg, |l| l.road_load.mass_kg);
