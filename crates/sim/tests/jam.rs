@@ -32,9 +32,10 @@ fn a_jam_takes_few_shifts_no_low_engine_speed_and_no_jerk() {
         let calm = !case.starts_with("queue");
         let bars = [
             ("collisions", f64::from(f.summary.collisions), 0.0),
-            ("shifts a minute", per_min, 7.0),
-            ("shifts up while slowing", f64::from(d.up_while_slowing), 2.0),
-            ("shifts taken back", f64::from(d.taken_back), 0.0),
+            ("shifts a minute", per_min, 6.0),
+            ("shifts up while slowing", f64::from(d.up_while_slowing), 0.0),
+            // One that has almost stopped and starts again at once.
+            ("shifts taken back", f64::from(d.taken_back), 1.0),
             ("s below idle", d.below_idle_s, 0.0),
             ("s of lugging", d.lugging_s, 0.0),
             ("m/s2 forward", d.accel_m_s2.max, 0.7),
@@ -49,7 +50,7 @@ fn a_jam_takes_few_shifts_no_low_engine_speed_and_no_jerk() {
             }
         }
     });
-    assert!(shifts / minutes < 5.0, "{:.1} shifts a minute in all jams", shifts / minutes);
+    assert!(shifts / minutes < 3.0, "{:.1} shifts a minute in all jams", shifts / minutes);
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
@@ -62,7 +63,7 @@ fn the_gap_takes_up_the_waves_of_a_jam() {
         let f = follow("sinotruk", 36_000.0, &slope(0.0), &speeds, &config, &mut ());
         let stops = speeds.windows(2).filter(|w| w[0] > 0.0 && w[1] <= 0.0).count() as u32;
         let d = &f.drive;
-        assert!(d.stops <= stops.div_ceil(3), "{name}: {} stops behind {stops}", d.stops);
-        assert!(d.max_gap_m.unwrap() < 90.0, "{name}: {:?}", d.max_gap_m);
+        assert!(d.stops <= stops.div_ceil(2), "{name}: {} stops behind {stops}", d.stops);
+        assert!(d.max_gap_m.unwrap() < 65.0, "{name}: {:?}", d.max_gap_m);
     }
 }

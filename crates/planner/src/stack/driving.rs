@@ -290,6 +290,8 @@ impl Stack {
         } else {
             GearRequest::Automatic
         };
+        let kept = self.jam.gear(dt_s, ego, limits, speed.accelerator_pedal_frac);
+        let gear = if gear == GearRequest::Automatic { kept } else { gear };
         let (error, wheel_rad) = self.steer(ego, path, road, limits);
         self.plan.target_speed_m_s = target.speed_m_s;
         self.plan.target_accel_m_s2 = speed.accel_m_s2;
