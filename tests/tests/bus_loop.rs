@@ -28,8 +28,8 @@ fn on_loopback(scenario: &Scenario) -> World {
 
 #[test]
 fn a_drive_over_a_bus_is_the_drive_that_it_is_directly() {
-    for name in ["test-site", "medium-15"] {
-        let scenario = scenario(name, 30.0);
+    for name in ["test-site", "medium-12.5"] {
+        let scenario = scenario(name, 60.0);
         let (mut direct, mut bus) = (World::new(&scenario, 1).unwrap(), on_loopback(&scenario));
         let (mut sum, mut ticks) = (0.0, 0.0);
         while direct.status() == Status::Running {

@@ -308,9 +308,11 @@ impl Snapshot<'_> {
         }
     }
 
-    /// Torque at the crank (or behind the gearbox, for a truck with such a retarder).
+    /// Torque of engine brake and retarder together, at the crank: the plant counts the engine brake
+    /// to the driveline's force, EEC1 does not have it.
     pub(super) fn erc1(&self) -> Erc1 {
-        let torque_nm = self.ego.powertrain.retarder_force_n / self.retarder_leverage_1_m();
+        let retarder_nm = self.ego.powertrain.retarder_force_n / self.retarder_leverage_1_m();
+        let torque_nm = retarder_nm + self.truck.plant().engine_brake_nm;
         let frac = (torque_nm / self.retarder_reference_nm()).clamp(0.0, 1.25);
         Erc1 {
             torque_mode: Slot::Value(if self.retarder_master.is_some() { OTHER } else { 0 }),
