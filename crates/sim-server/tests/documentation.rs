@@ -204,7 +204,9 @@ fn every_flag_that_a_page_names_exists() {
         let is_word = |w: &&String| w.chars().all(|c| c.is_ascii_lowercase());
         let ours: Vec<&str> = arguments.iter().take_while(is_word).map(String::as_str).collect();
         let name = match ours.as_slice() {
-            [a @ ("map" | "scenario" | "experiment" | "truck"), b, ..] => format!("{a} {b}"),
+            [a @ ("map" | "scenario" | "experiment" | "truck" | "can"), b, ..] => {
+                format!("{a} {b}")
+            }
             [a, ..] => (*a).to_owned(),
             [] => "run".to_owned(),
         };

@@ -29,7 +29,7 @@ pub struct End {
 
 enum Way {
     Loopback(LoopbackNode),
-    Given(Box<dyn Bus + Send>),
+    Given(Box<dyn Bus + Send + Sync>),
     CutOff,
 }
 
@@ -122,8 +122,8 @@ impl BusLoop {
     pub fn over(
         truck: SimTruck,
         rate: BitRate,
-        ecu: Box<dyn Bus + Send>,
-        driver: Box<dyn Bus + Send>,
+        ecu: Box<dyn Bus + Send + Sync>,
+        driver: Box<dyn Bus + Send + Sync>,
     ) -> Result<Self, SimError> {
         let end = |bus| End::new(Way::Given(bus), rate);
         Self::new(truck, rate, [end(ecu), end(driver)], None)

@@ -15,13 +15,14 @@ const LOOKS: u32 = 200_000;
 /// pace: an end that asks for frames waits until it has as many as the other one has sent. What
 /// does not come is given up after a bounded wait; frames of others on that bus shorten it.
 #[must_use]
-pub fn in_step<B: Bus + Send + 'static>(a: B, b: B) -> [Box<dyn Bus + Send>; 2] {
+pub fn in_step<B: Bus + Send + Sync + 'static>(a: B, b: B) -> [Box<dyn Bus + Send + Sync>; 2] {
     let sent = [Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0))];
     let [from_a, from_b] = &sent;
-    let end = |bus: B, sent: &Arc<AtomicU64>, to_come: &Arc<AtomicU64>| -> Box<dyn Bus + Send> {
-        let (sent, to_come) = (Arc::clone(sent), Arc::clone(to_come));
-        Box::new(InStep { bus, sent, to_come, came: 0 })
-    };
+    let end =
+        |bus: B, sent: &Arc<AtomicU64>, to_come: &Arc<AtomicU64>| -> Box<dyn Bus + Send + Sync> {
+            let (sent, to_come) = (Arc::clone(sent), Arc::clone(to_come));
+            Box::new(InStep { bus, sent, to_come, came: 0 })
+        };
     [end(a, from_a, from_b), end(b, from_b, from_a)]
 }
 

@@ -179,8 +179,8 @@ impl World {
     pub fn put_on_bus(
         &mut self,
         rate: BitRate,
-        ecu: Box<dyn Bus + Send>,
-        driver: Box<dyn Bus + Send>,
+        ecu: Box<dyn Bus + Send + Sync>,
+        driver: Box<dyn Bus + Send + Sync>,
     ) -> Result<(), SimError> {
         let looped = BusLoop::over(self.truck().clone(), rate, ecu, driver)?;
         self.plant.truck = Truck::Bus(Box::new(looped));

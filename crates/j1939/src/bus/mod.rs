@@ -16,6 +16,8 @@ mod error;
 pub mod faults;
 #[cfg(feature = "std")]
 pub mod loopback;
+#[cfg(feature = "std")]
+mod open;
 #[cfg(all(feature = "std", target_os = "linux"))]
 pub mod socketcan;
 #[cfg(feature = "std")]
@@ -23,6 +25,8 @@ pub mod socketcand;
 pub mod tap;
 
 pub use error::BusError;
+#[cfg(feature = "std")]
+pub use open::open;
 use tractrix_core::{Stamped, Time};
 
 use crate::Frame;

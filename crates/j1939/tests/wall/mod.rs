@@ -1,4 +1,5 @@
 //! Our stack in wall time, and the tools that it talks to.
+#![allow(unreachable_pub, dead_code, reason = "each test uses a part")]
 
 use std::io::{BufReader, Read};
 use std::process::{Child, Command, Stdio};

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub(crate) mod can;
 pub(crate) mod decode;
 pub(crate) mod diagnose;
 pub(crate) mod experiment;
@@ -29,6 +30,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Traffic(args)) => traffic::run(&args),
         Some(Command::Map(command)) => map::run(command),
         Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::Can(args)) => can::run(&args),
         Some(Command::Recover(args)) => recover::run(&args),
         Some(Command::Truck(command)) => truck::run(&command),
         Some(Command::Scenario(command)) => scenario::run(&command),

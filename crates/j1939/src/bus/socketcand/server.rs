@@ -79,13 +79,13 @@ impl<B: Bus> Server<B> {
         let mut all: Vec<(Option<usize>, Stamped<Frame>)> = Vec::new();
         let mut gone = Vec::new();
         for (index, client) in self.clients.iter_mut().enumerate() {
-            match client.listen(&self.interface, AT_ONCE) {
-                Ok(frames) => all.extend(frames.into_iter().map(|f| (Some(index), heard(now, f)))),
-                Err(why) => {
-                    client.words.say(&format!("error {why}"));
-                    gone.push(index);
-                }
+            // what a program said before it went is said
+            let mut frames = Vec::new();
+            if let Err(why) = client.listen(&self.interface, &mut frames) {
+                client.words.say(&format!("error {why}"));
+                gone.push(index);
             }
+            all.extend(frames.into_iter().map(|frame| (Some(index), heard(now, frame))));
         }
         for (_, frame) in &all {
             match self.bus.send(now, &frame.value) {
@@ -148,10 +148,9 @@ impl<B: Bus> Server<B> {
 }
 
 impl Session {
-    /// What the program sends to the bus.
-    fn listen(&mut self, interface: &str, at_once: usize) -> Result<Vec<Frame>, String> {
-        let mut frames = Vec::new();
-        for _ in 0..at_once {
+    /// Takes what the program sends to the bus.
+    fn listen(&mut self, interface: &str, frames: &mut Vec<Frame>) -> Result<(), String> {
+        for _ in 0..AT_ONCE {
             let Some(message) = self.words.next().map_err(|e| e.to_string())? else { break };
             let (command, rest) = message.split_once(' ').unwrap_or((&message, ""));
             match command {
@@ -167,7 +166,7 @@ impl Session {
                 other => return Err(format!("unknown command {other:?}")),
             }
         }
-        Ok(frames)
+        Ok(())
     }
 }
 

@@ -76,6 +76,16 @@ fn programs_hear_each_other_and_the_bus() {
 }
 
 #[test]
+fn what_a_program_says_before_it_goes_is_sent() {
+    let (bus, mut server, address) = server();
+    let mut stream = TcpStream::connect(&address).unwrap();
+    stream.write_all(b"< open can0 >< rawmode >< send 18EAFFFE 3 0 ee 0 >").unwrap();
+    drop(stream);
+    let mut node = bus.node(1);
+    until(&mut server, &mut 0, |_, t| node.receive(t).unwrap().is_some());
+}
+
+#[test]
 fn what_is_not_there_is_named() {
     let (_bus, mut server, address) = server();
     let error = connect(&mut server, &address, "can7").unwrap_err().to_string();
