@@ -1,5 +1,19 @@
 //! What the simulation gets wrong on measured drives, the named cause, the extended truck and the
 //! gain.
+//!
+//! ```
+//! use diagnosis::{Options, Plant, Serial, diagnose, read_drives};
+//! use dynamics::TruckParameters;
+//! use std::path::Path;
+//!
+//! let plant = Plant::of_truck(&TruckParameters::load("reference")?)?;
+//! let drives = read_drives(Path::new("../../examples/drives"))?;
+//! let baseline = read_drives(Path::new("../../examples/baseline"))?;
+//! let found =
+//!     diagnose(&plant, &drives, Some(&baseline), &Options::default(), &Serial, &mut |_| {})?;
+//! assert!(!found.causes.is_empty()); // more drag than the truck file has
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![cfg_attr(test, allow(clippy::indexing_slicing))]
 
 pub mod balance;

@@ -4,6 +4,21 @@
 //! [`TruckModel::step`] a pure function from state, command and road patch to the next state.
 //! Reference point: centre of the drive-axle group, on the ground. SI and radians; truck files use
 //! rpm where the field does.
+//!
+//! ```
+//! use dynamics::{RoadPatch, TruckModel, TruckParameters};
+//! use tractrix_core::Command;
+//!
+//! let truck = TruckModel::new(TruckParameters::load("longhaul")?, 21_000.0)?;
+//! let uphill = RoadPatch { grade_rad: 0.02, ..RoadPatch::default() };
+//! let command = Command { accelerator_pedal_frac: 1.0, ..Command::default() };
+//! let mut state = truck.initial_state(0.0, 0.0, 0.0, 20.0);
+//! for _ in 0..100 {
+//!     state = truck.step(&state, &command, &uphill, 0.01)?;
+//! }
+//! assert!((state.distance_m - 20.0).abs() < 0.5);
+//! # Ok::<(), dynamics::DynamicsError>(())
+//! ```
 
 mod bounds;
 pub mod catalogue;

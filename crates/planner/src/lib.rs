@@ -14,6 +14,16 @@
 //!
 //! Without default features the crate is `no_std + alloc` and needs no solver. It plans with what a
 //! truck tells about itself ([`tractrix_core::VehicleLimits`]) and never sees the plant's model.
+//!
+//! ```
+//! use planner::safety::{RssConfig, SafeGap};
+//! use tractrix_core::VehicleClass;
+//!
+//! // A car that comes with 25 m/s may be this near to a truck that changes into its lane with 22.
+//! let rss = RssConfig::default();
+//! let behind = SafeGap::new(&rss.behind(VehicleClass::Car), rss.ego_brake_max_m_s2, 0.0);
+//! assert!((behind.gap_m(25.0, 22.0) - 80.5).abs() < 0.1);
+//! ```
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 #[cfg(test)]

@@ -3,6 +3,15 @@
 //! A [`Road`] is one carriageway as the ego drives it: station `s` in metres along the reference
 //! line, offset `d` to the left of it. Grade is positive uphill, bank positive with the left side
 //! up, curvature positive to the left, headings counter-clockwise from map x.
+//!
+//! ```
+//! let road = road::Road::load("builtin:highway")?; // or a map.xodr, a profile.csv
+//! assert_eq!(road.lanes_at(7_000.0).count(), 3); // a climbing lane
+//! let here = road.at(2_000.0, 0.0);
+//! let back = road.project(here.x_m, here.y_m, Some(1_950.0));
+//! assert!(back.is_some_and(|p| (p.s_m - 2_000.0).abs() < 0.01));
+//! # Ok::<(), road::RoadError>(())
+//! ```
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 

@@ -6,6 +6,35 @@
 //! records or watches.
 //!
 //! Left out on purpose: clocks and pacing, sockets, files other than scenarios, roads and trucks.
+//!
+//! ```
+//! use sim::{Scenario, World};
+//!
+//! let mut scenario = Scenario::builtin("highway")?;
+//! scenario.run.duration_s = 5.0;
+//! let summary = World::new(&scenario, 1)?.run(&mut ())?;
+//! assert!(summary.collisions == 0 && summary.distance_m > 90.0);
+//! # Ok::<(), sim::SimError>(())
+//! ```
+//!
+//! A trip is planned with what the truck tells about itself:
+//!
+//! ```
+//! use planner::pcc::{SpeedBand, TripRequest, Tuning, plan_trip, profile_of};
+//! use tractrix_core::Vehicle;
+//!
+//! let world = sim::World::new(&sim::Scenario::builtin("highway-empty")?, 1)?;
+//! let trip = plan_trip(&TripRequest {
+//!     profile: &profile_of(world.road(), 25.0)[..160],
+//!     truck: world.truck().limits(),
+//!     band: SpeedBand { set_m_s: 22.2, min_m_s: 20.0, max_m_s: 24.4 },
+//!     trip_time_s: None,
+//!     eco_roll: false,
+//!     tuning: Tuning::default(),
+//! })?;
+//! assert!(trip.saving_vs_set_speed_frac > 0.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod bus_loop;
 mod collision;
