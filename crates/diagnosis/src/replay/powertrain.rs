@@ -130,6 +130,9 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     });
     let (scale, low) = (1.0 + t[P::FuelScale as usize], t[P::FuelLow as usize]);
     let per_load = 1.0 / (LOW_LOAD_FRAC * t[P::FuelLowLoad as usize].exp());
+    // Between two samples their noise averages out, which is no sign of a lag.
+    let between = lag - lag.floor();
+    let calmed = (0.25 * (3.0 + between.powi(2) + (1.0 - between).powi(2))).sqrt();
     valid
         .iter()
         .enumerate()
@@ -143,7 +146,7 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 measured += 0.25 * d.fuel[i];
                 modelled += 0.25 * rate[i] * scale * (1.0 + extra);
             }
-            (measured - modelled) / noise_g_s(measured)
+            (measured - modelled) / (noise_g_s(measured) * calmed)
         })
         .collect()
 }

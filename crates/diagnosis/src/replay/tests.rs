@@ -152,3 +152,40 @@ fn brakes_that_are_held_say_it_once_and_a_load_of_their_own_is_a_tolerance() {
     assert!(worst_kpa(LOAD - 1.0) < 2.5, "{} kPa", worst_kpa(LOAD - 1.0));
     assert!(worst_kpa(0.0) > 9.0, "{} kPa", worst_kpa(0.0));
 }
+
+/// Half a sample of lag averages two samples' noise: the calibration once took that for a lag, and
+/// what the false lag made of every released pedal was an effect outside the catalogue.
+#[test]
+fn noise_of_the_torque_message_is_no_lag_of_the_fuel() {
+    let truck = TruckParameters::load("reference").unwrap();
+    let plant = Plant::of_truck(&truck).unwrap();
+    let n = 40_000;
+    let mut random = 1_u64;
+    let mut noise_percent = || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963);
+        (random >> 40) as f64 / (1_u64 << 24) as f64 - 0.5
+    };
+    let (rpm, percent) = (1_200.0, 50.0);
+    let torque_nm = 0.01 * percent * truck.engine.reference_torque_nm;
+    let fuel_g_s = plant.engine.fuel_rate_g_s(rpm / RPM_PER_RAD_S, torque_nm);
+    let mut drive = Drive::new("steady", 0.0, n);
+    drive.set(C::EngineTorquePercent, (0..n).map(|_| percent + noise_percent()).collect());
+    for (channel, value) in
+        [(C::SpeedMS, 22.0), (C::EngineSpeedRpm, rpm), (C::Gear, 12.0), (C::FuelRateGS, fuel_g_s)]
+    {
+        drive.set(channel, vec![value; n]);
+    }
+    let d = Prepared::new(&drive, &plant);
+    let mean_square = |lag_s| {
+        let mut theta = [0.0; PARAMS];
+        theta[P::FuelLag as usize] = lag_s;
+        let mut out = Residuals::default();
+        replay_group(&d, &plant, &theta, Group::Fuel, &mut out);
+        let rows = out[M::Fuel as usize].iter().zip(&d.valid[M::Fuel as usize]);
+        let squares: Vec<f64> = rows.filter(|(_, ok)| **ok).map(|(x, _)| x * x).collect();
+        assert!(squares.len() > 9_000, "{} rows", squares.len());
+        squares.iter().sum::<f64>() / squares.len() as f64
+    };
+    let ratio = mean_square(0.5 * Drive::STEP_S) / mean_square(0.0);
+    assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
+}
