@@ -38,6 +38,8 @@ pub(crate) enum Command {
     Can(Box<cmd::can::Args>),
     /// Makes a whole recording of one torn by a crash.
     Recover(cmd::recover::Args),
+    /// Puts the virtual truck alone on a bus, in wall time.
+    Ecu(cmd::ecu::Args),
     /// Makes sheets of truck files, for programs on a truck.
     #[command(subcommand)]
     Truck(cmd::truck::Command),

@@ -48,13 +48,26 @@ fn a_sheet_is_not_made_of_a_wrong_truck_or_over_another_file() {
 }
 
 #[test]
-fn what_the_contract_names_and_this_version_lacks_says_so() {
-    for option in [
-        &["--vehicle", "can:can0"][..],
-        &["--vehicle", "socketcand:localhost:29536/can0"],
-        &["--ros2"],
-        &["--foxglove"],
+fn a_bus_that_cannot_be_used_is_named() {
+    for (bus, says) in [
+        ("can:no-such-iface", "no-such-iface"),
+        ("can:", "interface"),
+        ("socketcand:127.0.0.1:1/vcan0", "127.0.0.1:1"),
+        ("socketcand:127.0.0.1", "socketcand:HOST:PORT/IFACE"),
+        ("slcan:/dev/ttyS0", "socketcand:HOST:PORT/IFACE"),
     ] {
+        let line = refused(&["run", "flat", "--headless", "--vehicle", bus]);
+        assert!(line.contains("--vehicle") && line.contains(says), "{bus}: {line}");
+        let line = refused(&["ecu", "flat", "--bus", bus]);
+        assert!(line.contains("--bus") && line.contains(says), "{bus}: {line}");
+    }
+    assert!(refused(&["run", "--headless", "--vehicle", "tram"]).contains("tram"));
+    assert!(refused(&["ecu"]).contains("--bus"));
+}
+
+#[test]
+fn what_the_contract_names_and_this_version_lacks_says_so() {
+    for option in [&["--ros2"][..], &["--foxglove"]] {
         let line = refused(&[&["run", "--headless"], option].concat());
         assert!(line.contains("not supported"), "{option:?}: {line}");
     }

@@ -3,6 +3,7 @@
 pub(crate) mod can;
 pub(crate) mod decode;
 pub(crate) mod diagnose;
+pub(crate) mod ecu;
 pub(crate) mod experiment;
 pub(crate) mod map;
 pub(crate) mod plan;
@@ -32,6 +33,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::Can(args)) => can::run(&args),
         Some(Command::Recover(args)) => recover::run(&args),
+        Some(Command::Ecu(args)) => ecu::run(&args),
         Some(Command::Truck(command)) => truck::run(&command),
         Some(Command::Scenario(command)) => scenario::run(&command),
     }

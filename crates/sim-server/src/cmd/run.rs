@@ -47,8 +47,8 @@ pub(crate) struct Args {
     /// Who sets the reference speed: cruise or predictive.
     #[arg(long)]
     speed_planner: Option<String>,
-    /// How the stack reaches the truck: direct, or bus (J1939 in memory); can and socketcand are not
-    /// supported yet.
+    /// How the stack reaches the truck: direct, bus (J1939 in memory), can:IFACE or
+    /// socketcand:HOST:PORT/IFACE (J1939 over that bus, both ends in this process).
     #[arg(long, default_value = "direct", value_parser = vehicle)]
     vehicle: String,
     /// Ends the run after this simulated time.

@@ -40,15 +40,21 @@ fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Reaches the truck as `--vehicle` says: directly, or over a bus in memory.
+/// Reaches the truck as `--vehicle` says: directly, over a bus in memory, or over a bus outside
+/// (both ends in this process, time from the ticks).
 ///
 /// # Errors
-/// [`Failure::Input`] names a bus that cannot be used.
+/// [`Failure::Input`] names a bus that does not exist or cannot be opened.
 pub(super) fn connect(world: &mut World, vehicle: &str) -> Result<(), Failure> {
     let rate = BitRate::Kbit250;
     match vehicle {
         "direct" => Ok(()),
         "bus" => world.put_on_loopback(rate).map_err(Failure::work),
-        name => Err(Failure::unsupported(&format!("--vehicle {name}"))),
+        name => {
+            let open =
+                || j1939::bus::open(name).map_err(|e| Failure::Input(format!("--vehicle {e}")));
+            let [ecu, driver] = sim::in_step(open()?, open()?);
+            world.put_on_bus(rate, ecu, driver).map_err(Failure::work)
+        }
     }
 }
