@@ -116,7 +116,7 @@ fn every_effect_of_the_truck_file_is_in_the_balance() {
 fn brakes_that_are_held_say_it_once_and_a_load_of_their_own_is_a_tolerance() {
     const LOAD: f64 = 0.88;
     let truck = TruckParameters::load("reference").unwrap();
-    let (n, reported_kg) = (3_600 * 20, 40_000.0);
+    let (n, reported_kg) = (3_600 * 20_usize, 40_000.0);
     let demand = |i: usize| match i {
         0..40 => 0.0,
         40..100 => 1.5,
@@ -141,7 +141,7 @@ fn brakes_that_are_held_say_it_once_and_a_load_of_their_own_is_a_tolerance() {
     let plant = Plant::of_truck(&truck).unwrap();
     let d = Prepared::new(&drive, &plant);
     let rows = d.valid[M::Brake as usize].iter().filter(|ok| **ok).count();
-    assert!((60..150).contains(&rows), "{rows} rows");
+    assert!((30..150).contains(&rows), "{rows} rows");
     let worst_kpa = |load_estimate| {
         let mut theta = [0.0; PARAMS];
         theta[P::BrakeLoad as usize] = load_estimate;
