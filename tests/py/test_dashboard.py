@@ -484,6 +484,11 @@ def test_light_and_dark_follow_the_system_or_the_choice_and_can_be_read(
         plots_are_there(page)
         assert luminance(page, "body") > 200
         page.emulate_media(color_scheme="dark")
+        # the page hears of it in an event of its own time
+        page.wait_for_function(
+            """() => getComputedStyle(document.body).backgroundColor
+              .match(/[\\d.]+/g).slice(0, 3).every((v) => Number(v) < 40)"""
+        )
         assert luminance(page, "body") < 40
         page.focus("#theme")
         page.keyboard.press("Enter")

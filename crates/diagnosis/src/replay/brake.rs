@@ -38,11 +38,22 @@ pub(super) fn resolved(d: &Prepared, plant: &Plant) -> Vec<f64> {
     if !d.available[M::Brake as usize] {
         return d.pressure.clone();
     }
-    let mut chambers = Chambers::new(d, plant, &[0.0; crate::param::PARAMS]);
+    let modelled = |load_estimate: f64| {
+        let mut theta = [0.0; crate::param::PARAMS];
+        theta[P::BrakeLoad as usize] = load_estimate;
+        let mut chambers = Chambers::new(d, plant, &theta);
+        (0..d.n).map(|i| chambers.step(i)).collect::<Vec<_>>()
+    };
+    // With a load that is off, the modelled pressure lies on one side of every message.
+    let by_sheet = modelled(0.0);
+    let product: f64 = d.pressure.iter().zip(&by_sheet).map(|(p, m)| p * m).sum();
+    let square: f64 = by_sheet.iter().map(|m| m * m).sum();
+    let spec = P::BrakeLoad.spec();
+    let load = if square > 0.0 { (product / square - 1.0).clamp(spec.lo, spec.hi) } else { 0.0 };
     d.pressure
         .iter()
-        .enumerate()
-        .map(|(i, p)| chambers.step(i).clamp(p - 0.5 * step, p + 0.5 * step).max(0.0))
+        .zip(modelled(load))
+        .map(|(p, m)| m.clamp(p - 0.5 * step, p + 0.5 * step).max(0.0))
         .collect()
 }
 
