@@ -71,7 +71,6 @@ fn the_truck_keeps_clear_of_an_emergency_vehicle_and_changes_lanes_behind_it() {
 }
 
 #[test]
-#[ignore = "needs SUMO; the closed loop with it is not measured yet, see docs/traffic.md"]
 fn in_sumos_traffic_it_does_the_same() {
     if let Err(e) = Programs::find(None) {
         eprintln!("skipped: {e}");
