@@ -40,10 +40,11 @@ pub(crate) fn drive_error_by(
 ) -> DriveError {
     let mut e = DriveError::default();
     if d.available[Module::Force as usize] {
-        let model = Longitudinal::new(d, plant, theta);
+        let t = plant.with_instruments(theta);
+        let model = Longitudinal::new(d, plant, &t);
         let steps = (HORIZON_S / Drive::STEP_S) as usize;
         let mut start = 0;
-        let scale = 1.0 / (1.0 + theta[crate::param::P::SpeedScale as usize]);
+        let scale = 1.0 / (1.0 + t[crate::param::P::SpeedScale as usize]);
         while start + steps < d.n {
             let mut v = d.speed[start];
             for i in start..start + steps {

@@ -12,9 +12,9 @@
 use std::collections::BTreeMap;
 
 use dynamics::{Overlay, OverlayValue, TruckParameters};
-use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
+use tractrix_core::RPM_PER_RAD_S;
 
-use crate::replay::{CRUISE_RPM, LOW_LOAD_FRAC};
+use crate::replay::{CRUISE_RPM, LOW_LOAD_FRAC, RETARDER_POWER_W};
 use crate::{Cause, NotObservable};
 
 /// An overlay and what could not go into it.
@@ -26,25 +26,14 @@ pub struct Extension {
     pub not_carried: Vec<NotObservable>,
 }
 
-/// Thresholds and time constants from which the replay counts its shape parameters.
-const FAN_FROM_DEGC: f64 = 97.0;
-const FADE_FROM_DEGC: f64 = 150.0;
-const ALTITUDE_FROM_M: f64 = 1_500.0;
-const AIR_FROM_DEGC: f64 = 30.0;
-const WARMUP_S: f64 = 1_800.0;
-/// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
-const RETARDER_POWER_W: f64 = 400_000.0;
-
 /// How a fitted parameter becomes a figure of the truck file.
 enum Carry {
     /// `figure * value`.
     Times(&'static str),
     /// `figure + factor * value`.
     Plus(&'static str, f64),
-    /// `a + factor * value`, whatever the figure was.
-    From(&'static str, f64, f64),
-    /// `a * exp(value)`, whatever the figure was.
-    Exp(&'static str, f64),
+    /// `figure * exp(value)`.
+    Exp(&'static str),
     /// Share of the driveline's power that is lost on top.
     Loss,
     /// Seconds on top of the three phases of a shift.
@@ -62,7 +51,7 @@ enum Carry {
 }
 
 fn carry(id: &str, key: &str) -> Option<Carry> {
-    use Carry::{Exp, From, Nowhere, Plus, Times};
+    use Carry::{Exp, Nowhere, Plus, Times};
     Some(match (id, key) {
         ("rolling_resistance", "coefficient_scale") => Times("resistance.rolling_coeff"),
         ("air_drag", "cd_a_scale") => Times("resistance.drag_area_m2"),
@@ -73,24 +62,18 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("grade_bias", "grade_frac") => Plus("instruments.grade_bias_frac", 1.0),
         ("map_shift", "shift_m") => Plus("instruments.map_shift_m", 1.0),
         ("tyre_warmup", "cold_extra_frac") => Plus("resistance.cold_tyre_extra_frac", 1.0),
-        ("tyre_warmup", "ln_time_constant") => Exp("resistance.tyre_warmup_s", WARMUP_S),
+        ("tyre_warmup", "ln_time_constant") => Exp("resistance.tyre_warmup_s"),
         ("driveline_loss", "extra_loss_frac") => Carry::Loss,
         ("fan_load", "fan_power_kw") => Plus("engine.fan_power_w", 1e3),
-        ("fan_load", "coolant_start_offset_k") => {
-            From("engine.fan_on_k", ZERO_DEGC_K + FAN_FROM_DEGC, 1.0)
-        }
+        ("fan_load", "coolant_start_offset_k") => Plus("engine.fan_on_k", 1.0),
         ("fan_load", "hysteresis_k") => Plus("engine.fan_hysteresis_k", 1.0),
         ("mass" | "payload_position", "stiffness_follows_load") => Carry::Implied,
         ("dragging_brake", "force_n") => Plus("resistance.parasitic_force_n", 1.0),
         ("engine_friction", "friction_scale") => Times("engine.friction_scale_coeff"),
         ("altitude_derate", "torque_loss_per_km") => Plus("engine.derate_altitude_1_m", 1e-3),
-        ("altitude_derate", "start_offset_m") => {
-            From("engine.derate_altitude_m", ALTITUDE_FROM_M, 1.0)
-        }
+        ("altitude_derate", "start_offset_m") => Plus("engine.derate_altitude_m", 1.0),
         ("heat_derate", "torque_loss_per_10_k_air") => Plus("engine.derate_air_1_k", 0.1),
-        ("heat_derate", "air_start_offset_k") => {
-            From("engine.derate_air_k", ZERO_DEGC_K + AIR_FROM_DEGC, 1.0)
-        }
+        ("heat_derate", "air_start_offset_k") => Plus("engine.derate_air_k", 1.0),
         ("heat_derate", "torque_loss_per_10_k_coolant" | "coolant_start_offset_k") => {
             Nowhere("the truck file has no derating by coolant temperature")
         }
@@ -104,9 +87,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("fuel_map_low_load", "over") => Carry::Implied,
         ("brake_gain", "gain_scale") => Times("brake.gain_scale_coeff"),
         ("brake_fade", "loss_per_100_k") => Plus("brake.fade_1_k", 0.01),
-        ("brake_fade", "start_offset_k") => {
-            From("brake.fade_from_k", ZERO_DEGC_K + FADE_FROM_DEGC, 1.0)
-        }
+        ("brake_fade", "start_offset_k") => Plus("brake.fade_from_k", 1.0),
         ("brake_delay", "delay_s") => Plus("brake.dead_time_s", 1.0),
         ("hidden_retarder", "torque_per_stage_nm") => Carry::Retarder,
         ("hidden_retarder", "force_n_per_m_s2") => Carry::BrakeDemand,
@@ -151,12 +132,19 @@ impl Carry {
         match *self {
             Self::Times(path) => one(path, now(path) * value, now(path) * sigma),
             Self::Plus(path, k) => one(path, now(path) + k * value, k * sigma),
-            Self::From(path, a, k) => one(path, a + k * value, k * sigma),
-            Self::Exp(path, a) => one(path, a * value.exp(), a * value.exp() * sigma),
+            Self::Exp(path) => {
+                let figure = now(path) * value.exp();
+                one(path, figure, figure * sigma)
+            }
             Self::Loss => {
                 let d = &truck.driveline;
                 let nominal = 1.0 - d.gearbox_efficiency_frac * d.axle_efficiency_frac;
-                let per_loss = d.efficiency_frac() / nominal.max(1e-6);
+                if nominal < 1e-6 {
+                    // A driveline that loses nothing has nothing to scale.
+                    let path = "driveline.axle_efficiency_frac";
+                    return one(path, now(path) * (1.0 - value), now(path) * sigma);
+                }
+                let per_loss = d.efficiency_frac() / nominal;
                 let path = "driveline.loss_scale_coeff";
                 one(path, now(path) + per_loss * value, per_loss * sigma)
             }

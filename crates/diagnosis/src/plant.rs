@@ -7,6 +7,7 @@ use dynamics::lateral::LateralParameters;
 use tractrix_core::Curve;
 
 use crate::DiagnosisError;
+use crate::param::{P, Theta};
 
 /// A truck file, and what is made of it once for all drives.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +20,9 @@ pub struct Plant {
     pub truck: TruckParameters,
     /// Its engine.
     pub engine: Engine,
+    /// The engine that the control unit believes in when it reads the pedal: the friction as it was
+    /// calibrated, without the file's factor on it.
+    pub(crate) control: Engine,
     /// Lateral parameters, empty trailer.
     pub lateral: LateralParameters,
     /// Its fitted tables: acceleration over a signal.
@@ -26,8 +30,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The truck of a truck file. Left out are the faults of instruments that an extended truck
-    /// file carries.
+    /// The truck of a truck file.
     ///
     /// # Errors
     /// [`DiagnosisError::Truck`] if a table cannot be used.
@@ -38,7 +41,10 @@ impl Plant {
         let mut lateral = truck.lateral;
         let mass_kg = lateral.total_mass_kg();
         lateral.payload.mass_kg = 0.0;
+        let mut calibrated = truck.engine.clone();
+        calibrated.friction_scale_coeff = 1.0;
         Ok(Self {
+            control: Engine::new(calibrated).map_err(bad)?,
             name: truck.name.clone(),
             mass_kg,
             engine: Engine::new(truck.engine.clone()).map_err(bad)?,
@@ -46,5 +52,24 @@ impl Plant {
             truck: truck.clone(),
             lateral,
         })
+    }
+
+    /// Parameters off by `theta` from the truck file, counted from a truck whose instruments, map and
+    /// load sheet are right: the file's own faults of these are part of the result.
+    pub(crate) fn with_instruments(&self, theta: &Theta) -> Theta {
+        let i = &self.truck.instruments;
+        let mut t = *theta;
+        for (p, scale) in [(P::SpeedScale, i.speed_scale_coeff), (P::Mass, i.mass_scale_coeff)] {
+            t[p as usize] = scale * (1.0 + t[p as usize]) - 1.0;
+        }
+        for (p, offset) in [
+            (P::YawBias, i.yaw_rate_bias_rad_s),
+            (P::GradeBias, i.grade_bias_frac),
+            (P::MapShift, i.map_shift_m),
+            (P::Bank, i.bank_offset_rad),
+        ] {
+            t[p as usize] += offset;
+        }
+        t
     }
 }

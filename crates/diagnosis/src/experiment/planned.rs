@@ -111,7 +111,7 @@ pub(super) fn drive(
         }
     }
     let mut out = Drive::new(&name, 0.0, rows.len());
-    out.reported_mass_kg = Some(model.mass_kg());
+    out.reported_mass_kg = Some(model.mass_kg() / model.parameters().instruments.mass_scale_coeff);
     out.tyres_warm_at_start = Some(plan.warm);
     for channel in Channel::all() {
         out.set(channel, rows.iter().map(|r| r[channel as usize]).collect());

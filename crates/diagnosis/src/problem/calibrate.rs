@@ -57,14 +57,14 @@ pub(super) fn fit_whiteners(
                 .map(|(d, r)| (r[i].as_slice(), d.valid[i].as_slice()));
             let fitted = Whitener::fit(records, if white { 0 } else { order(*m) });
             let mut w = fitted.unwrap_or_else(|| Whitener::white(1.0));
-            w.sigma = w.sigma.max(floor(*m));
+            w.sigma = w.sigma.max(resolution(*m));
             w
         })
         .collect()
 }
 
 /// Resolution of the channels: noise is never assumed smaller.
-fn floor(m: Module) -> f64 {
+pub(crate) fn resolution(m: Module) -> f64 {
     match m {
         Module::Force | Module::Imu | Module::Gps => 1e-3,
         Module::Torque => 0.2,

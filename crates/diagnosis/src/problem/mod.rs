@@ -13,6 +13,8 @@ pub(crate) use gram::Gram;
 pub(crate) use nuisance::Rest;
 
 use calibrate::fit_whiteners;
+#[cfg(test)]
+pub(crate) use calibrate::resolution;
 use nuisance::{Changed, Nuisance};
 use signals::Kept;
 

@@ -4,6 +4,7 @@
 
 use std::sync::Arc;
 
+use dynamics::SUBSTEP_S;
 use dynamics::effects::brake::friction_left_frac;
 use dynamics::effects::driveline::{from_speed_frac, with_losses_n};
 use dynamics::effects::resistance::{area_at_yaw_m2, cold_factor, drag_n, grade_n, rolling_n};
@@ -19,6 +20,9 @@ use crate::{Drive, Plant};
 
 /// Samples that a speed at a window's end is averaged over (two 10 Hz messages).
 pub(super) const EDGE: usize = 4;
+
+/// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
+pub(crate) const RETARDER_POWER_W: f64 = 400_000.0;
 
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[super::Module::Force as usize];
@@ -69,13 +73,15 @@ pub(crate) struct Longitudinal<'a> {
     cd_a_m2: f64,
     drag_yaw_1_rad: f64,
     wind: Wind,
-    rolling: f64,
+    rolling_coeff: f64,
     cold: f64,
     grade_bias: f64,
     brake: f64,
-    /// Loss of force per kelvin and where it begins, K: the truck file's, and the parameters'.
-    fade: [(f64, f64); 2],
-    retarder: [f64; 3],
+    /// Loss of force per kelvin, and where it begins, K.
+    fade: (f64, f64),
+    /// Force of the retarders of a released accelerator, N, and per brake demand, kg.
+    on_coast_n: f64,
+    on_brake_kg: f64,
     /// Speed from which the retarder of a released accelerator acts, m/s.
     coast_from_m_s: f64,
     parasitic_n: f64,
@@ -83,6 +89,7 @@ pub(crate) struct Longitudinal<'a> {
     service_n: Arc<[f64]>,
     heat: Option<Arc<[f64]>>,
     fan: Option<Arc<[f64]>>,
+    retarder_n: Option<Arc<[f64]>>,
     cold_left: Option<Arc<[f64]>>,
 }
 
@@ -92,38 +99,36 @@ impl<'a> Longitudinal<'a> {
         let (driveline, resistance) = (&plant.truck.driveline, &plant.truck.resistance);
         let per_prop = driveline.shaft_force_n(1.0);
         let brake = &plant.truck.brake;
-        let fade = [
-            (brake.fade_1_k, brake.fade_from_k),
-            (0.01 * at(P::Fade), 150.0 + ZERO_DEGC_K + at(P::FadeStart)),
-        ];
+        let fade = (brake.fade_1_k + 0.01 * at(P::Fade), brake.fade_from_k + at(P::FadeStart));
+        let fan_w = plant.truck.engine.fan_power_w + 1e3 * at(P::FanPower);
+        let cold = resistance.cold_tyre_extra_frac + at(P::WarmupAmp);
+        let on_coast_nm = driveline.hidden_retarder_torque_nm + at(P::RetarderCoast);
         Self {
             d: &d.balance,
             mass_kg: d.mass_kg * (1.0 + at(P::Mass)),
             torque: 1.0 + at(P::TorqueScale),
             friction: 1.0 + at(P::Friction),
             engine_brake: 1.0 + at(P::EngineBrakeScale),
-            fan_w: 1e3 * at(P::FanPower),
+            fan_w,
             efficiency: driveline.efficiency_frac() * (1.0 - at(P::DrivelineLoss)),
             cd_a_m2: resistance.drag_area_m2 * (1.0 + at(P::Drag)),
             drag_yaw_1_rad: resistance.drag_yaw_1_rad,
             wind: Wind::new(plant, t),
-            rolling: 1.0 + at(P::Rolling),
-            cold: at(P::WarmupAmp),
+            rolling_coeff: resistance.rolling_coeff * (1.0 + at(P::Rolling)),
+            cold,
             grade_bias: at(P::GradeBias),
             brake: 1.0 + at(P::BrakeGain),
             fade,
-            retarder: [
-                at(P::RetarderStage) * per_prop,
-                at(P::RetarderCoast) * per_prop,
-                at(P::RetarderBrake),
-            ],
+            on_coast_n: on_coast_nm * per_prop,
+            on_brake_kg: at(P::RetarderBrake),
             coast_from_m_s: driveline.hidden_retarder_from_m_s + at(P::RetarderFrom),
             parasitic_n: resistance.parasitic_force_n + at(P::DragBrake),
             grade: d.grade_shifted(at(P::MapShift)),
             service_n: service_n(d, plant, at(P::PressureLag)),
-            heat: fade.iter().any(|f| f.0 != 0.0).then(|| brake_heat(d, plant, t)),
-            fan: (at(P::FanPower) != 0.0).then(|| fan(d, t)),
-            cold_left: (at(P::WarmupAmp) != 0.0 && !d.warm).then(|| cold_left(d, t)),
+            heat: (fade.0 != 0.0).then(|| brake_heat(d, plant, t, fade)),
+            fan: (fan_w != 0.0).then(|| fan(d, plant, t)),
+            retarder_n: retarder_n(d, plant, at(P::RetarderStage)),
+            cold_left: (cold != 0.0 && !d.warm).then(|| cold_left(d, plant, t)),
         }
     }
 
@@ -154,30 +159,29 @@ impl<'a> Longitudinal<'a> {
             cold = lanes(|j| cold_factor(self.cold, left[j]));
         }
         let (cos, grade) = (cut::<L>(&d.cos, at), cut::<L>(&self.grade, at));
-        let coeff = cut::<L>(&d.rolling_coeff, at);
+        let by_speed = cut::<L>(&d.rolling_by_speed, at);
         for j in 0..L {
             // The cosine changes by less than 1e-3 of a grade error: the map's counts.
             force[j] -= air[j]
-                + rolling_n(self.mass_kg, cos[j], coeff[j] * self.rolling, cold[j])
+                + rolling_n(self.mass_kg, cos[j], self.rolling_coeff + by_speed[j], cold[j])
                 + grade_n(self.mass_kg, cos[j] * (grade[j] + self.grade_bias));
         }
         let service_n = cut::<L>(&self.service_n, at);
         let mut service: [f64; L] = lanes(|j| self.brake * service_n[j]);
         if let Some(heat) = &self.heat {
             let (heat, air_k) = (cut::<L>(heat, at), cut::<L>(&d.air_k, at));
-            for (loss, from) in self.fade {
-                for j in 0..L {
-                    service[j] *= friction_left_frac(loss, heat[j] + air_k[j], from);
-                }
+            let (loss, from) = self.fade;
+            for j in 0..L {
+                service[j] *= friction_left_frac(loss, heat[j] + air_k[j], from);
             }
         }
         let (holding, table) = (cut::<L>(&d.holding_n, at), cut::<L>(&d.table_m_s2, at));
-        let (stage, xbr) = (cut::<L>(&d.engine_brake_frac, at), cut::<L>(&d.xbr, at));
+        let xbr = cut::<L>(&d.xbr, at);
+        let stage: [f64; L] = self.retarder_n.as_ref().map_or([0.0; L], |n| *cut::<L>(n, at));
         let (coasts, rotating) = (cut::<L>(&d.coasts, at), cut::<L>(&d.rotating_kg, at));
-        let [on_stage, on_coast, on_brake] = self.retarder;
         lanes(|j| {
-            let coasting = on_coast * coasts[j] * from_speed_frac(v[j], self.coast_from_m_s);
-            let retarder = on_stage * stage[j] + coasting + on_brake * xbr[j];
+            let coasting = self.on_coast_n * coasts[j] * from_speed_frac(v[j], self.coast_from_m_s);
+            let retarder = stage[j] + coasting + self.on_brake_kg * xbr[j];
             let held = service[j] + retarder + holding[j] + self.parasitic_n;
             (force[j] - held) / (self.mass_kg + rotating[j]) + table[j]
         })
@@ -203,7 +207,7 @@ impl<'a> Longitudinal<'a> {
 
 /// Force of cold brakes at the pressure that brakes, later by the lag, N.
 fn service_n(d: &Prepared, plant: &Plant, lag_s: f64) -> Arc<[f64]> {
-    d.profiles.get(Kind::Service, [lag_s, 0.0], || {
+    d.profiles.get(Kind::Service, [lag_s], || {
         let lag = lag_s / Drive::STEP_S;
         let pressure_pa = |i: usize| PA_PER_KPA * at_index(&d.fine_pressure, i as f64 + lag);
         let force_n = (0..d.n).map(|i| plant.truck.brake.cold_force_n(1.0, pressure_pa(i)));
@@ -211,29 +215,41 @@ fn service_n(d: &Prepared, plant: &Plant, lag_s: f64) -> Arc<[f64]> {
     })
 }
 
-/// Heating of the brakes above the air at the measured speed, K.
-fn brake_heat(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
-    let (lag, speed) = (t[P::PressureLag as usize], t[P::SpeedScale as usize]);
+/// Heating of the brakes above the air at the measured speed, K, by the force that they have: faded
+/// brakes heat less.
+fn brake_heat(
+    d: &Prepared,
+    plant: &Plant,
+    t: &Theta,
+    (loss_1_k, from_k): (f64, f64),
+) -> Arc<[f64]> {
+    let [lag, speed, gain] = [P::PressureLag, P::SpeedScale, P::BrakeGain].map(|p| t[p as usize]);
     let service_n = service_n(d, plant, lag);
-    d.profiles.get(Kind::BrakeHeat, [lag, speed], || {
+    d.profiles.get(Kind::BrakeHeat, [lag, speed, gain, loss_1_k, from_k], || {
+        let brake = &plant.truck.brake;
         let mut heat_k = 0.0;
-        let steps = d.speed.iter().zip(service_n.iter()).map(|(v, force_n)| {
-            let (before, power_w) = (heat_k, force_n * v / (1.0 + speed));
-            heat_k = plant.truck.brake.temperature_step_k(heat_k, power_w, 1.0, 0.0, Drive::STEP_S);
-            before
-        });
+        let steps =
+            d.speed.iter().zip(&d.ambient).zip(service_n.iter()).map(|((v, air), force_n)| {
+                let before = heat_k;
+                let left = friction_left_frac(loss_1_k, heat_k + air + ZERO_DEGC_K, from_k);
+                let power_w = (1.0 + gain) * force_n * left * v / (1.0 + speed);
+                heat_k = brake.temperature_step_k(heat_k, power_w, 1.0, 0.0, Drive::STEP_S);
+                before
+            });
         pad(steps, d.balance.padded)
     })
 }
 
 /// How far the fan is on: play between two thresholds, on above the start, off below it by the
 /// width.
-fn fan(d: &Prepared, t: &Theta) -> Arc<[f64]> {
-    let (start, width) = (t[P::FanStart as usize], t[P::FanWidth as usize]);
+fn fan(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
+    let engine = &plant.truck.engine;
+    let start = engine.fan_on_k - ZERO_DEGC_K + t[P::FanStart as usize];
+    let width = engine.fan_hysteresis_k + t[P::FanWidth as usize];
     d.profiles.get(Kind::Fan, [start, width], || {
         let mut on = 0.0_f64;
         let steps = d.coolant.iter().map(|coolant| {
-            let over = coolant - 97.0 - start;
+            let over = coolant - start;
             let (low, high) = (step(over, 0.7), step(over + width, 0.7));
             on = on.clamp(low, high);
             on
@@ -242,11 +258,35 @@ fn fan(d: &Prepared, t: &Theta) -> Arc<[f64]> {
     })
 }
 
+/// Force of a retarder that follows its stage, N: the file's, with `extra_nm` more at the propeller
+/// shaft.
+fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<Arc<[f64]>> {
+    let mut driveline = plant.truck.driveline.clone();
+    if extra_nm != 0.0 {
+        driveline.retarder_torque_nm += extra_nm;
+        driveline.retarder_power_w = driveline.retarder_power_w.max(RETARDER_POWER_W);
+    }
+    (driveline.retarder_torque_nm != 0.0).then(|| {
+        d.profiles.get(Kind::Retarder, [extra_nm], || {
+            let substeps = (Drive::STEP_S / SUBSTEP_S).round() as usize;
+            let mut torque_nm = 0.0;
+            let steps = d.speed.iter().zip(&d.engine_brake).map(|(v, stage)| {
+                let target_nm = stage * driveline.retarder_limit_nm(*v);
+                for _ in 0..substeps {
+                    torque_nm = driveline.retarder_step_nm(torque_nm, target_nm, SUBSTEP_S);
+                }
+                driveline.shaft_force_n(torque_nm)
+            });
+            pad(steps, d.balance.padded)
+        })
+    })
+}
+
 /// Share of the cold tyres' extra resistance that is left.
-fn cold_left(d: &Prepared, t: &Theta) -> Arc<[f64]> {
+fn cold_left(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
     let tau = t[P::WarmupTau as usize];
-    d.profiles.get(Kind::Cold, [tau, 0.0], || {
-        let cooling = (-Drive::STEP_S / (1800.0 * tau.exp())).exp();
+    d.profiles.get(Kind::Cold, [tau], || {
+        let cooling = (-Drive::STEP_S / (plant.truck.resistance.tyre_warmup_s * tau.exp())).exp();
         let mut left = 1.0;
         let steps = (0..d.n).map(|_| {
             let now = left;
@@ -260,7 +300,7 @@ fn cold_left(d: &Prepared, t: &Theta) -> Arc<[f64]> {
 impl Prepared {
     /// Grade of a map that is off by `shift_m`, padded to whole blocks.
     pub(super) fn grade_shifted(&self, shift_m: f64) -> Arc<[f64]> {
-        self.profiles.get(Kind::Grade, [shift_m, 0.0], || {
+        self.profiles.get(Kind::Grade, [shift_m], || {
             let at = |i: usize| match shift_m {
                 0.0 => self.grade[i],
                 _ => self.grade_by_s.at(self.s_map[i] + shift_m),

@@ -1,13 +1,11 @@
 //! Inputs of the force balance that depend on no parameter, and work on them in blocks of samples.
 
-use dynamics::SUBSTEP_S;
 use dynamics::effects::driveline::RELEASED_PEDAL_FRAC;
-use dynamics::effects::resistance::cold_factor;
 use dynamics::effects::table::accel_m_s2;
 use tractrix_core::ZERO_DEGC_K;
 
 use super::prepared::Prepared;
-use crate::{Drive, Plant};
+use crate::Plant;
 
 /// Samples that are computed side by side.
 pub(super) const BLOCK: usize = 64;
@@ -19,7 +17,7 @@ pub(crate) struct Inputs {
     pub(super) speed: Vec<f64>,
     pub(super) indicated_nm: Vec<f64>,
     pub(super) friction_nm: Vec<f64>,
-    /// Auxiliaries, with the truck file's own fan.
+    /// Auxiliaries without the fan.
     pub(super) auxiliary_nm: Vec<f64>,
     /// Torque per power at the crank, Nm/W.
     pub(super) per_w: Vec<f64>,
@@ -30,16 +28,15 @@ pub(crate) struct Inputs {
     pub(super) density: Vec<f64>,
     /// Cosine of the grade.
     pub(super) cos: Vec<f64>,
-    /// Rolling resistance coefficient of the truck file.
-    pub(super) rolling_coeff: Vec<f64>,
-    /// Retarder and induced drag of the truck file, N, against the motion.
+    /// Part of the rolling resistance coefficient that grows with speed.
+    pub(super) rolling_by_speed: Vec<f64>,
+    /// Induced drag of the tyres' side forces, N, against the motion.
     pub(super) holding_n: Vec<f64>,
     /// The truck file's fitted tables, m/s².
     pub(super) table_m_s2: Vec<f64>,
     pub(super) course_sin: Vec<f64>,
     pub(super) course_cos: Vec<f64>,
     pub(super) air_k: Vec<f64>,
-    pub(super) engine_brake_frac: Vec<f64>,
     pub(super) xbr: Vec<f64>,
     /// 1 where the driver asks for nothing.
     pub(super) coasts: Vec<f64>,
@@ -56,9 +53,7 @@ impl Inputs {
             })
             .collect();
         let gear = |i: usize| per_gear[if d.gear[i] < per_gear.len() { d.gear[i] } else { 0 }];
-        let (fan, holding) = (file_fan(d, plant), file_holding_n(d, plant));
-        let warmup = -Drive::STEP_S / truck.resistance.tyre_warmup_s;
-        let cold = |i: usize| if d.warm { 0.0 } else { (i as f64 * warmup).exp() };
+        let holding = induced_n(d, plant);
         let padded = d.n.next_multiple_of(BLOCK);
         let of = |f: &dyn Fn(usize) -> f64| -> Vec<f64> { pad((0..d.n).map(f), padded) };
         Self {
@@ -66,60 +61,34 @@ impl Inputs {
             speed: of(&|i| d.speed[i]),
             indicated_nm: of(&|i| d.torque[i] * 0.01 * truck.engine.reference_torque_nm),
             friction_nm: of(&|i| engine.friction_nm(d.omega[i])),
-            auxiliary_nm: of(&|i| engine.auxiliary_nm(d.omega[i], fan[i])),
+            auxiliary_nm: of(&|i| engine.auxiliary_nm(d.omega[i], false)),
             per_w: of(&|i| engine.crank_nm(1.0, d.omega[i])),
             engine_brake_nm: of(&|i| d.engine_brake[i] * engine.engine_brake_nm(d.omega[i])),
             ratio_1_m: of(&|i| gear(i).0),
             rotating_kg: of(&|i| gear(i).1),
             density: of(&|i| d.density[i]),
             cos: of(&|i| d.slope[i]),
-            rolling_coeff: of(&|i| {
-                truck.resistance.rolling_coeff_at(d.speed[i])
-                    * cold_factor(truck.resistance.cold_tyre_extra_frac, cold(i))
-            }),
+            rolling_by_speed: of(&|i| truck.resistance.rolling_per_speed_s_m * d.speed[i]),
             holding_n: pad(holding.into_iter(), padded),
             table_m_s2: of(&|i| accel_m_s2(&plant.tables, d.speed[i], |s| d.signal(s, i))),
             course_sin: of(&|i| d.course[i].0),
             course_cos: of(&|i| d.course[i].1),
             air_k: of(&|i| d.ambient[i] + ZERO_DEGC_K),
-            engine_brake_frac: of(&|i| d.engine_brake[i]),
             xbr: of(&|i| d.xbr[i]),
             coasts: of(&|i| if d.pedal[i] < RELEASED_PEDAL_FRAC { 1.0 } else { 0.0 }),
         }
     }
 }
 
-/// Whether the truck file's own fan runs, from the measured coolant.
-fn file_fan(d: &Prepared, plant: &Plant) -> Vec<bool> {
-    let mut runs = false;
-    let steps = d.coolant.iter().map(|coolant| {
-        runs = plant.engine.fan_runs(runs, coolant + ZERO_DEGC_K);
-        runs
-    });
-    steps.collect()
-}
-
-/// Force of the truck file's own retarder, from the measured demand and speed, and the drag that
-/// its tyres' side forces induce, from the measured yaw rate, N.
-fn file_holding_n(d: &Prepared, plant: &Plant) -> Vec<f64> {
-    let (driveline, resistance) = (&plant.truck.driveline, &plant.truck.resistance);
-    let loaded = super::lateral::loaded(d, plant, &[0.0; crate::param::PARAMS]);
+/// Drag that the side forces of the tyres induce, from the measured yaw rate, N. Their stiffness is
+/// that of the load sheet without the file's factors: those are lateral figures, which the balance
+/// would only blur.
+fn induced_n(d: &Prepared, plant: &Plant) -> Vec<f64> {
+    let mut loaded = super::lateral::loaded(d, plant, &[0.0; crate::param::PARAMS]);
+    loaded.tyres.stiffness_scale = [1.0; 3];
     let stiffness: f64 = loaded.tyres.stiffness_n_rad(&loaded.static_axle_load_n()).iter().sum();
-    let substeps = (Drive::STEP_S / SUBSTEP_S).round() as usize;
-    let mut retarder_nm = 0.0;
-    (0..d.n)
-        .map(|i| {
-            let v = d.speed[i];
-            if driveline.retarder_torque_nm > 0.0 {
-                let target_nm = d.engine_brake[i] * driveline.retarder_limit_nm(v);
-                for _ in 0..substeps {
-                    retarder_nm = driveline.retarder_step_nm(retarder_nm, target_nm, SUBSTEP_S);
-                }
-            }
-            driveline.shaft_force_n(retarder_nm + driveline.hidden_retarder_nm(v, d.pedal[i]))
-                + resistance.curve_n(d.mass_kg, v * d.yaw[i], stiffness)
-        })
-        .collect()
+    let lateral_m_s2 = d.speed.iter().zip(&d.yaw).map(|(v, yaw)| v * yaw);
+    lateral_m_s2.map(|a| plant.truck.resistance.curve_n(d.mass_kg, a, stiffness)).collect()
 }
 
 /// A signal with its last value held up to `padded` samples.

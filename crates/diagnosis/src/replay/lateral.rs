@@ -27,7 +27,10 @@ pub(crate) fn loaded(d: &Prepared, plant: &Plant, t: &Theta) -> LateralParameter
 /// of a payload that lies elsewhere.
 fn stiffness(d: &Prepared, plant: &Plant, t: &Theta) -> [f64; dynamics::lateral::AXLES] {
     let mut sheet = *t;
-    sheet[P::Mass as usize] *= t[P::StiffnessFollowsMass as usize];
+    // What the truck file itself says of the true mass, its tyres follow.
+    let own = plant.truck.instruments.mass_scale_coeff;
+    let more = (1.0 + t[P::Mass as usize]) / own - 1.0;
+    sheet[P::Mass as usize] = own * (1.0 + more * t[P::StiffnessFollowsMass as usize]) - 1.0;
     sheet[P::PayloadX as usize] *= t[P::StiffnessFollows as usize];
     let p = loaded(d, plant, &sheet);
     p.tyres.stiffness_n_rad(&p.static_axle_load_n())

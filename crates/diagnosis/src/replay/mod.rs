@@ -16,6 +16,7 @@ mod profiles;
 mod sensors;
 mod smooth;
 
+pub(crate) use force::RETARDER_POWER_W;
 pub(crate) use powertrain::noise_g_s as fuel_noise_g_s;
 pub(crate) use powertrain::{CRUISE_RPM, LOW_LOAD_FRAC};
 pub(crate) use prepared::Prepared;
@@ -241,6 +242,7 @@ pub(crate) fn replay_group(
     out: &mut Residuals,
 ) {
     debug_assert_eq!(t.len(), PARAMS);
+    let t = &plant.with_instruments(t);
     if !group.modules().iter().any(|m| d.available[*m as usize]) {
         return;
     }
@@ -265,5 +267,7 @@ pub(crate) fn replay_group(
     }
 }
 
+#[cfg(test)]
+mod invariance;
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use dynamics::effects::engine::left_frac;
 use dynamics::effects::shift::ShiftPhase;
-use tractrix_core::RPM_PER_RAD_S;
+use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
@@ -10,10 +10,13 @@ use super::profiles::Kind;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
 
+/// Coolant temperature from which an engine protects itself, degC.
+const COOLANT_DEGC: f64 = 98.0;
+
 /// Torque response, percent of the reference torque, mean over two samples.
 pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Torque as usize];
-    let (engine, file) = (&plant.engine, &plant.truck.engine);
+    let (engine, file) = (&plant.control, &plant.truck.engine);
     let delay = (file.pedal_delay_s + t[P::PedalDelay as usize]) / Drive::STEP_S;
     let rise = Rise {
         fast_s: file.fast_lag_s,
@@ -22,10 +25,10 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let from = (file.lag_threshold_frac + t[P::TurboStart as usize]).max(0.0);
     let keep = [rise.fast_s, rise.slow_s].map(|lag| (-Drive::STEP_S / lag).exp());
     let percent = 100.0 / file.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
-    let pedal = d.profiles.get(Kind::Pedal, [delay, 0.0], || {
+    let pedal = d.profiles.get(Kind::Pedal, [delay], || {
         (0..d.n).map(|i| at_index(&d.pedal, i as f64 - delay)).collect()
     });
-    let derates = [P::Altitude, P::HeatAir, P::HeatCoolant].map(|p| t[p as usize]) != [0.0; 3];
+    let derating = Derating::new(plant, t);
     let mut out = vec![0.0; valid.len()];
     let mut torque = 0.0;
     let mut running = false;
@@ -42,7 +45,7 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 continue;
             }
             let n = d.turning[i];
-            let full = d.full_load[i] * if derates { derate(d, t, i) } else { 1.0 };
+            let full = d.full_load[i] * derating.left(d, i);
             let demand = engine.governed_nm(engine.pedal_demand_nm(pedal[i], n, full), n, full);
             let threshold = from * full;
             torque = if torque < threshold && threshold < demand {
@@ -76,16 +79,38 @@ impl Rise {
     }
 }
 
-/// Part of the full load that is left at this altitude, air and coolant temperature.
-#[inline]
-fn derate(d: &Prepared, t: &Theta, i: usize) -> f64 {
-    let left = |size: P, unit: f64, x: f64, from: f64, start: P| {
-        left_frac(t[size as usize] / unit, x, from + t[start as usize])
-    };
-    let thin = left(P::Altitude, 1e3, d.altitude[i], 1500.0, P::AltitudeStart);
-    let hot = left(P::HeatAir, 10.0, d.ambient[i], 30.0, P::HeatAirStart);
-    let boiling = left(P::HeatCoolant, 10.0, d.coolant[i], 98.0, P::HeatCoolantStart);
-    (thin * hot * boiling).clamp(0.2, 1.5)
+/// What altitude, air and coolant temperature take from the full load: loss per unit, and where it
+/// begins (m, degC, degC).
+struct Derating {
+    thin: (f64, f64),
+    hot: (f64, f64),
+    boiling: (f64, f64),
+}
+
+impl Derating {
+    fn new(plant: &Plant, t: &Theta) -> Self {
+        let (file, at) = (&plant.truck.engine, |p: P| t[p as usize]);
+        let air_degc = file.derate_air_k - ZERO_DEGC_K;
+        Self {
+            thin: (
+                file.derate_altitude_1_m + 1e-3 * at(P::Altitude),
+                file.derate_altitude_m + at(P::AltitudeStart),
+            ),
+            hot: (file.derate_air_1_k + 0.1 * at(P::HeatAir), air_degc + at(P::HeatAirStart)),
+            boiling: (0.1 * at(P::HeatCoolant), COOLANT_DEGC + at(P::HeatCoolantStart)),
+        }
+    }
+
+    /// Part of the full load that is left at a sample.
+    #[inline]
+    fn left(&self, d: &Prepared, i: usize) -> f64 {
+        if [self.thin.0, self.hot.0, self.boiling.0] == [0.0; 3] {
+            return 1.0;
+        }
+        let left = |(loss, from): (f64, f64), x: f64| left_frac(loss, x, from);
+        let air = left(self.thin, d.altitude[i]) * left(self.hot, d.ambient[i]);
+        (air * left(self.boiling, d.coolant[i])).clamp(0.2, 1.5)
+    }
 }
 
 /// Measured minus expected duration of every shift, s.
@@ -112,7 +137,7 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
         (percent * 0.01 * plant.truck.engine.reference_torque_nm).max(1e-9)
     };
     let omega = |i: usize| at_index(&d.rpm, i as f64 - lag) / RPM_PER_RAD_S;
-    let rate = d.profiles.get(Kind::Willans, [lag, 0.0], || {
+    let rate = d.profiles.get(Kind::Willans, [lag], || {
         (0..d.n).map(|i| plant.engine.fuel_rate_g_s(omega(i), torque(i))).collect()
     });
     // What is low: torque over the full load at this speed, power, or torque, these two over full

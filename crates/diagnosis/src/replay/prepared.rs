@@ -150,9 +150,7 @@ impl Prepared {
         let omega: Vec<f64> = rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
         let turning = smooth::running_mean(&omega, smooth::CRANK);
         let altitude = get(C::GpsAltitudeM, 0.0);
-        let air = turning.iter().zip(&altitude).zip(&ambient);
-        let full_load =
-            air.map(|((n, h), t)| plant.engine.full_load_at_nm(*n, *h, t + ZERO_DEGC_K)).collect();
+        let full_load = turning.iter().map(|n| plant.engine.full_load_nm.at(*n)).collect();
         let gear: Vec<usize> = get(C::Gear, 0.0).iter().map(|g| g.max(0.0) as usize).collect();
         let shifting: Vec<bool> = get(C::ShiftInProcess, 0.0).iter().map(|s| *s > 0.5).collect();
         let shifts = runs(&shifting);

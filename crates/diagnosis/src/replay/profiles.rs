@@ -9,10 +9,12 @@ use std::sync::{Arc, Mutex};
 pub(super) enum Kind {
     /// Force of cold brakes, N; over the lag.
     Service,
-    /// Heating of the brakes above the air, K; over lag and speed scale.
+    /// Heating of the brakes above the air, K; over lag, speed scale, gain and fade.
     BrakeHeat,
     /// How far the fan is on, 0 to 1; over start and hysteresis.
     Fan,
+    /// Force of the retarder that follows its stage, N; over what it has more.
+    Retarder,
     /// Share of the cold tyres' extra that is left; over the time constant.
     Cold,
     /// Grade of the map; over its shift.
@@ -28,21 +30,25 @@ pub(super) enum Kind {
 /// Most signals kept per drive.
 const KEPT: usize = 28;
 
-type Entry = (Kind, [u64; 2], Arc<[f64]>);
+/// Values of the parameters that a signal depends on, the rest zero.
+type Key = [u64; 5];
+
+type Entry = (Kind, Key, Arc<[f64]>);
 
 /// The kept signals of one drive, the latest at the end, and memory to work in.
 #[derive(Debug, Default)]
 pub(crate) struct Profiles(Mutex<Vec<Entry>>, Mutex<Vec<Vec<f64>>>);
 
 impl Profiles {
-    /// The signal at two parameter values, built where it is not kept.
-    pub(super) fn get(
+    /// The signal at up to five parameter values, built where it is not kept.
+    pub(super) fn get<const N: usize>(
         &self,
         kind: Kind,
-        at: [f64; 2],
+        at: [f64; N],
         build: impl FnOnce() -> Vec<f64>,
     ) -> Arc<[f64]> {
-        let key = at.map(f64::to_bits);
+        let mut key = Key::default();
+        key.iter_mut().zip(at).for_each(|(k, x)| *k = x.to_bits());
         if let Ok(mut kept) = self.0.lock()
             && let Some(i) = kept.iter().rposition(|e| e.0 == kind && e.1 == key)
         {

@@ -84,7 +84,7 @@ fn one() -> f64 {
     1.0
 }
 fn fade_from_k() -> f64 {
-    523.15
+    423.15
 }
 fn air_per_fill() -> f64 {
     0.04

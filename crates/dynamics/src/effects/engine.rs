@@ -115,13 +115,13 @@ fn one() -> f64 {
     1.0
 }
 fn fan_on_k() -> f64 {
-    367.0
+    370.15
 }
 fn derate_altitude_m() -> f64 {
     1_500.0
 }
 fn derate_air_k() -> f64 {
-    308.15
+    303.15
 }
 
 impl EngineParameters {

@@ -65,7 +65,7 @@ fn one() -> f64 {
     1.0
 }
 fn warmup_s() -> f64 {
-    1_500.0
+    1_800.0
 }
 
 /// Air flow as the truck feels it.
