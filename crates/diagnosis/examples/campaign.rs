@@ -50,7 +50,7 @@ struct Table {
 }
 
 /// Causes that the speed shows when torque, pressure and gear are as measured.
-const ON_SPEED: [&str; 16] = [
+const ON_SPEED: [&str; 17] = [
     "rolling_resistance",
     "air_drag",
     "headwind",
@@ -65,6 +65,7 @@ const ON_SPEED: [&str; 16] = [
     "engine_friction",
     "brake_gain",
     "brake_fade",
+    "engine_brake_torque",
     "hidden_retarder",
     "speed_scale",
 ];
@@ -89,6 +90,7 @@ fn expected(id: &str, size: f64) -> Option<(&'static str, f64)> {
         "pedal_delay" | "brake_delay" => ("delay_s", size),
         "shift_duration" => ("extra_time_s", size),
         "brake_gain" => ("gain_scale", 1.0 + size),
+        "engine_brake_torque" => ("torque_scale", 1.0 + size),
         "speed_scale" => ("scale", 1.0 + size),
         "yaw_rate_bias" => ("bias_rad_s", size),
         "steering_ratio" => ("ratio_scale", 1.0 + size),

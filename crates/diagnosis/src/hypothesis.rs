@@ -352,6 +352,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.003,
         0.0,
     ),
+    h(
+        "engine_brake_torque",
+        V,
+        &[P::EngineBrakeScale],
+        &[],
+        ONE,
+        &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::EngineBrakeFrac],
+        0.06,
+        0.0,
+    ),
     h("crosswind", M, &[P::Crosswind], &[], ONE, &[C::SteeringWheelRad, C::YawRateRadS], 1.0, 0.0),
 ];
 
@@ -396,7 +406,8 @@ mod tests {
             turbo_lag pedal_delay shift_duration fuel_map_low_load brake_gain brake_fade \
             brake_delay hidden_retarder speed_scale yaw_rate_bias steering_ratio steering_offset \
             steering_free_play steering_lag cornering_stiffness_front cornering_stiffness_drive \
-            cornering_stiffness_trailer payload_position road_bank crosswind";
+            cornering_stiffness_trailer payload_position road_bank crosswind \
+            engine_brake_torque";
         for id in ids.split_whitespace() {
             assert!(CATALOGUE.iter().any(|h| h.id == id), "{id}");
         }

@@ -85,6 +85,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("fuel_map_low_load", "ln_load") => Carry::LowLoad,
         // The truck file's extra consumption follows power.
         ("fuel_map_low_load", "over") => Carry::Implied,
+        ("engine_brake_torque", "torque_scale") => Times("engine.engine_brake_scale_coeff"),
         ("brake_gain", "gain_scale") => Times("brake.gain_scale_coeff"),
         ("brake_fade", "loss_per_100_k") => Plus("brake.fade_1_k", 0.01),
         ("brake_fade", "start_offset_k") => Plus("brake.fade_from_k", 1.0),

@@ -175,7 +175,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::TrailerYawBias, "bias_rad_s", "rad/s", (0.004, -0.05, 0.05, 0.001), 3e-4, 0.0),
     s(P::FuelScale, "scale", "1", (0.05, -0.4, 0.6, 0.01), 0.005, 0.01),
     s(P::TorqueScale, "scale", "1", (0.05, -0.4, 0.4, 0.01), 0.003, 0.0),
-    s(P::EngineBrakeScale, "scale", "1", (0.1, -0.6, 1.0, 0.05), 0.015, 0.0),
+    s(P::EngineBrakeScale, "torque_scale", "1", (0.2, -0.9, 1.0, 0.05), 0.015, 0.0),
     s(P::SpeedLag, "lag_s", "s", (0.1, -1.0, 1.0, 0.02), 0.004, 0.05),
     s(P::FuelLag, "lag_s", "s", (0.1, -0.3, 2.0, 0.02), 0.004, 0.05),
     s(P::TorqueReport, "scale", "1", (0.05, -0.3, 0.3, 0.01), 0.002, 0.0),

@@ -61,6 +61,7 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
             if x >= 0.0 { "more" } else { "less" }
         ),
         "brake_gain" => scaled("Brake force per pressure"),
+        "engine_brake_torque" => scaled("The engine brake's torque"),
         "brake_fade" => format!("Hot brakes lose {percent} % of their force per 100 K."),
         "brake_delay" => format!("The brakes answer {x:.2} s later than modelled."),
         "hidden_retarder" => "A retarder acts that the model does not have.".to_owned(),
@@ -109,6 +110,9 @@ pub(crate) fn confusion(a: &str, b: &str, lost_nats: f64) -> String {
         "curves at one speed only; drive the same curve at 40 and 80 km/h"
     } else if has(&["steering_offset", "yaw_rate_bias", "road_bank", "crosswind"]) {
         "straight road at one speed; stand still for the gyro, drive straight slowly and fast in both directions"
+    } else if has(&["engine_brake_torque", "hidden_retarder", "engine_friction", "driveline_loss"])
+    {
+        "hold speed down one grade by the engine brake alone, in two gears and on two stages, and coast"
     } else if has(&["brake_gain", "brake_fade", "hidden_retarder"]) {
         "stops with cold and with hot brakes are needed"
     } else if has(&["altitude_derate", "heat_derate"]) {
@@ -131,6 +135,7 @@ pub(crate) fn not_excited(id: &str) -> &'static str {
         "tyre_warmup" => "no drive starts with cold tyres",
         "payload_position" => "no drive with payload in curves",
         "brake_gain" | "brake_delay" => "too little braking",
+        "engine_brake_torque" => "the engine brake hardly acts",
         _ => "the drives excite it too little",
     }
 }

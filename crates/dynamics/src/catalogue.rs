@@ -167,7 +167,7 @@ macro_rules! cause {
 
 /// Every cause that the truck model can carry.
 #[rustfmt::skip]
-pub static CATALOGUE: [Cause; 34] = [
+pub static CATALOGUE: [Cause; 35] = [
     cause!("rolling_resistance", Value,
         "rolling resistance higher than modelled" / "rolling resistance lower than modelled",
         [scale("resistance.rolling_coeff", 0.2, -0.6, 1.5)], []),
@@ -286,6 +286,9 @@ pub static CATALOGUE: [Cause; 34] = [
     cause!("crosswind", MissingPhysics,
         "a crosswind blows to the left" / "a crosswind blows to the right",
         [add("resistance.crosswind_to_left_m_s", "m/s", 4.0, -20.0, 20.0)], []),
+    cause!("engine_brake_torque", Value,
+        "the engine brake holds more than modelled" / "the engine brake holds less than modelled",
+        [scale("engine.engine_brake_scale_coeff", 0.2, -0.9, 1.0)], []),
 ];
 
 /// A cause by its id.

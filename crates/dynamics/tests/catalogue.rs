@@ -11,7 +11,7 @@ const IDS: &str = "rolling_resistance air_drag headwind wind mass grade_bias map
     pedal_delay shift_duration fuel_map_low_load brake_gain brake_fade brake_delay hidden_retarder \
     speed_scale yaw_rate_bias steering_ratio steering_offset steering_free_play steering_lag \
     cornering_stiffness_front cornering_stiffness_drive cornering_stiffness_trailer \
-    payload_position road_bank crosswind";
+    payload_position road_bank crosswind engine_brake_torque";
 
 const PAYLOAD_KG: f64 = 20_000.0;
 
@@ -45,8 +45,8 @@ fn drive(truck: TruckParameters) -> Vec<EgoState> {
             Command { accelerator_pedal_frac, ..Command::default() }
         } else {
             let xbr_decel_m_s2 = if s.speed_m_s > 15.0 { 0.9 } else { 0.0 };
-            let brake_mode = BrakeMode::Maximum;
-            Command { xbr_decel_m_s2, brake_mode, ..Command::default() }
+            let (brake_mode, retarder_frac) = (BrakeMode::Maximum, 0.5);
+            Command { xbr_decel_m_s2, brake_mode, retarder_frac, ..Command::default() }
         };
         let steering_wheel_rad = 0.3 * (0.4 * t).sin();
         s = model.step(&s, &Command { steering_wheel_rad, ..command }, &patch, 0.5).unwrap();

@@ -42,6 +42,9 @@ pub fn advice(id: &str) -> &'static str {
             "Measure the engine at low load, or take the fuel map from this fit: idle and coasting cost more."
         }
         "brake_gain" => "Check linings and chamber strokes: pressure gives another force.",
+        "engine_brake_torque" => {
+            "Check the engine brake's valve clearance, oil pressure and flap; plan descents by what it holds now."
+        }
         "brake_fade" => {
             "Plan descents with engine brake and retarder first: hot brakes lose force."
         }

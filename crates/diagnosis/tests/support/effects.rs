@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::outside::Outside;
 use super::random::{between, sign};
-use super::sheet::{AXLE, Figures, RADIUS_M, full_load};
+use super::sheet::{AXLE, Figures, RADIUS_M, engine_brake, full_load};
 
 /// What is wrong with the truck, beyond its tolerances.
 #[derive(Debug, Clone)]
@@ -38,7 +38,7 @@ impl Shape {
 }
 
 /// Id, medium size, whether either sign occurs.
-pub(crate) const SIZES: [(&str, f64, bool); 34] = [
+pub(crate) const SIZES: [(&str, f64, bool); 35] = [
     ("rolling_resistance", 0.16, true),
     ("air_drag", 0.13, true),
     ("headwind", 2.2, true),
@@ -73,6 +73,7 @@ pub(crate) const SIZES: [(&str, f64, bool); 34] = [
     ("payload_position", 0.6, true),
     ("road_bank", 0.014, true),
     ("crosswind", 4.0, true),
+    ("engine_brake_torque", 0.22, true),
 ];
 
 /// How large a hidden cause is.
@@ -273,6 +274,12 @@ pub(crate) fn act(
             let over = now.ambient_degc + now.brake_k - shape.at(0, 90.0, 200.0);
             let loss = 0.01 * size * over.max(0.0);
             a.friction *= 1.0 - loss / (1.0 + loss);
+        }
+        "engine_brake_torque" => {
+            // Even over engine speed, or with a course of its own about 1500 rpm.
+            let power = if shape.choice(0, 2) == 0 { 0.0 } else { shape.at(1, -0.6, 0.6) };
+            let course = (now.rpm / 1500.0).powf(power);
+            a.crank_nm += size * now.stage * engine_brake(now.rpm) * course;
         }
         "hidden_retarder" => {
             let on = match shape.choice(0, 3) {

@@ -90,6 +90,9 @@ pub struct EngineParameters {
     pub engine_brake_constant_nm: f64,
     /// Engine-brake torque at full demand per speed, Nm/rpm.
     pub engine_brake_per_rpm_nm: f64,
+    /// Factor on the engine-brake torque, 1 = as given (valves or charge that hold less).
+    #[serde(default = "one")]
+    pub engine_brake_scale_coeff: f64,
     /// Lag of the engine brake, s.
     pub engine_brake_lag_s: f64,
     /// Fuel.
@@ -160,6 +163,7 @@ impl EngineParameters {
         b.within("derate_air_1_k", self.derate_air_1_k, 0.0, 0.1);
         b.within("engine_brake_constant_nm", self.engine_brake_constant_nm, 0.0, 5_000.0);
         b.within("engine_brake_per_rpm_nm", self.engine_brake_per_rpm_nm, 0.0, 5.0);
+        b.within("engine_brake_scale_coeff", self.engine_brake_scale_coeff, 0.0, 3.0);
         b.within("engine_brake_lag_s", self.engine_brake_lag_s, 0.005, 5.0);
         let range = Range {
             idle_rpm: self.idle_speed_rpm,
@@ -310,7 +314,8 @@ impl Engine {
         if speed_rad_s < 1.2 * self.idle_rad_s {
             return 0.0;
         }
-        p.engine_brake_constant_nm + p.engine_brake_per_rpm_nm * speed_rad_s * RPM_PER_RAD_S
+        p.engine_brake_scale_coeff
+            * (p.engine_brake_constant_nm + p.engine_brake_per_rpm_nm * speed_rad_s * RPM_PER_RAD_S)
     }
 
     /// Fuel flow, g/s, at a speed and an indicated torque.
