@@ -221,14 +221,15 @@ impl Engine {
         let (s_m, v) = (fleet.s_m[i], fleet.v_m_s[i]);
         let lane_map = &self.map.lanes[lane as usize];
         let driver = &fleet.driver[i];
-        let mut wish_m_s = lane_map.limit_m_s(s_m).min(self.limit_m_s) * driver.limit_factor;
+        let section = lane_map.section(s_m);
+        let mut wish_m_s = section.limit_m_s.min(self.limit_m_s) * driver.limit_factor;
         if s_m > self.map.s_end_m - BEYOND_M
             && let Some(&beyond_m_s) = self.beyond_m_s.get(lane as usize)
         {
             wish_m_s = wish_m_s.min(beyond_m_s);
         }
         let free = driver.idm.free_m_s2(v, wish_m_s);
-        let (lower_at_m, lower_m_s) = lane_map.lower_limit(s_m);
+        let (lower_at_m, lower_m_s) = section.lower;
         let lower_m_s = lower_m_s * driver.limit_factor;
         if v <= lower_m_s {
             return free;

@@ -1,7 +1,8 @@
 //! The road as the drivers need it: lanes sampled in cells, so that a step only reads tables.
 //!
 //! Cells of [`CELL_M`]; centre lines and widths are interpolated, limits, grades and neighbours
-//! hold for a cell.
+//! hold for a cell. What seldom changes along a lane is kept once per [`Section`], so that the
+//! tables of thousands of kilometres stay in the cache.
 
 /// Length of a cell, m.
 pub(crate) const CELL_M: f64 = 10.0;
@@ -39,20 +40,28 @@ pub(crate) struct Lane {
     center_d_m: Vec<f64>,
     /// Width at the cell borders, m.
     width_m: Vec<f64>,
-    /// Speed limit in the cell, m/s.
-    limit_m_s: Vec<f64>,
+    /// Section of each cell.
+    section: Vec<u32>,
+    sections: Vec<Section>,
+}
+
+/// A stretch of a lane in which drivers see the same rules and neighbours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Section {
+    /// Speed limit, m/s.
+    pub(crate) limit_m_s: f64,
     /// Start and value of the lower limit ahead that asks for the hardest braking, m, m/s; infinite
     /// where there is none.
-    lower: Vec<(f64, f64)>,
-    /// Lanes to the left and right in the cell.
-    beside: Vec<(u16, u16)>,
+    pub(crate) lower: (f64, f64),
+    /// Lanes to the left and right.
+    beside: (u16, u16),
 }
 
 impl Lane {
     /// Cell of a station and the fraction in it.
     fn cell(&self, s_m: f64) -> (usize, f64) {
         let x = ((s_m - self.s_start_m) * CELLS_PER_M).max(0.0);
-        let last = self.limit_m_s.len() - 1;
+        let last = self.section.len() - 1;
         let k = (x as usize).min(last);
         (k, (x - k as f64).min(1.0))
     }
@@ -75,15 +84,14 @@ impl Lane {
         self.width_m[k] + f * (self.width_m[k + 1] - self.width_m[k])
     }
 
-    /// Speed limit, m/s.
-    pub(crate) fn limit_m_s(&self, s_m: f64) -> f64 {
-        self.limit_m_s[self.cell(s_m).0]
+    /// Limits and neighbours at a station.
+    pub(crate) fn section(&self, s_m: f64) -> &Section {
+        &self.sections[self.section[self.cell(s_m).0] as usize]
     }
 
-    /// The lower limit that drivers prepare for at a station: where it begins, m, and what it is,
-    /// m/s; infinite where there is none.
-    pub(crate) fn lower_limit(&self, s_m: f64) -> (f64, f64) {
-        self.lower[self.cell(s_m).0]
+    /// Speed limit, m/s.
+    pub(crate) fn limit_m_s(&self, s_m: f64) -> f64 {
+        self.section(s_m).limit_m_s
     }
 }
 
@@ -108,8 +116,16 @@ impl LaneSource<'_> {
         let border = |k: usize| (self.s_start_m + k as f64 * CELL_M).min(self.s_end_m);
         let middle = |k: usize| 0.5 * (border(k) + border(k + 1));
         let limit_m_s: Vec<f64> = (0..cells).map(|k| (self.limit_m_s)(middle(k))).collect();
+        let lower = lower_limits(&limit_m_s, self.s_start_m);
+        let (mut section, mut sections) = (Vec::with_capacity(cells), Vec::<Section>::new());
+        for (k, (&limit_m_s, lower)) in limit_m_s.iter().zip(lower).enumerate() {
+            let here = Section { limit_m_s, lower, beside: (self.beside)(middle(k)) };
+            if sections.last() != Some(&here) {
+                sections.push(here);
+            }
+            section.push((sections.len() - 1) as u32);
+        }
         Lane {
-            lower: lower_limits(&limit_m_s, self.s_start_m),
             usage: self.usage,
             drops: self.drops,
             leaves: self.leaves,
@@ -117,8 +133,8 @@ impl LaneSource<'_> {
             s_end_m: self.s_end_m,
             center_d_m: (0..=cells).map(|k| (self.center_d_m)(border(k))).collect(),
             width_m: (0..=cells).map(|k| (self.width_m)(border(k))).collect(),
-            limit_m_s,
-            beside: (0..cells).map(|k| (self.beside)(middle(k))).collect(),
+            section,
+            sections,
         }
     }
 }
@@ -192,7 +208,7 @@ impl LaneMap {
             let reaches = |l: &Lane| s_m >= l.s_start_m && s_m <= l.s_end_m;
             if k != NO_LANE && reaches(&self.lanes[k as usize]) { k } else { NO_LANE }
         };
-        let (left, right) = lane.beside[lane.cell(s_m).0];
+        let (left, right) = lane.section(s_m).beside;
         (there(left), there(right))
     }
 
