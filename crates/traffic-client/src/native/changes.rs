@@ -8,6 +8,7 @@
 //! follower lets one in (cooperation), and both go back to their own headways slowly (relaxation).
 
 use driver_models::{Change, Mobil};
+use tractrix_core::VehicleClass;
 
 use super::engine::Engine;
 use super::lanes::NO_LANE;
@@ -164,6 +165,13 @@ impl Engine {
         Some((f, follows.min(in_time).max(-most)))
     }
 
+    /// Whether the traffic law keeps this class out of a lane that it does not need.
+    pub(super) fn is_closed_to(&self, lane: u16, class: VehicleClass) -> bool {
+        class == VehicleClass::Truck
+            && self.config.trucks_keep_out_of_left_lane
+            && self.map.is_left_of_three(lane)
+    }
+
     /// Whether a lane at a station is kept free for the ego.
     fn is_kept_for_ego(&self, lane: u16, s_m: f64) -> bool {
         self.ego_need.is_some_and(|need| {
@@ -256,6 +264,9 @@ impl Engine {
             return None;
         }
         if self.keeps_out(i, lane) || self.is_kept_for_ego(lane, s) {
+            return None;
+        }
+        if desire.is_none() && self.is_closed_to(lane, fleet.driver[i].class) {
             return None;
         }
         let to = &self.map.lanes[lane as usize];

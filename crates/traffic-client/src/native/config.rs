@@ -98,6 +98,9 @@ pub struct TrafficConfig {
     pub scene_radius_m: f64,
     /// Drivers see the ego (mode `inter`); otherwise they drive through it (mode `pure`).
     pub sees_ego: bool,
+    /// Trucks keep out of the leftmost of three or more lanes (German StVO § 7 (3c); most states of
+    /// the USA have left-lane restrictions for trucks of the same kind).
+    pub trucks_keep_out_of_left_lane: bool,
     /// Where a lane ends or an exit comes, drivers begin to change lanes this far before, m.
     pub mandatory_ahead_m: f64,
     /// Braking that a driver accepts to let another one merge, m/s².
@@ -199,6 +202,7 @@ impl Default for TrafficConfig {
             ego_clearance_m: 50.0,
             scene_radius_m: 300.0,
             sees_ego: true,
+            trucks_keep_out_of_left_lane: true,
             mandatory_ahead_m: 800.0,
             yield_decel_m_s2: 1.5,
             inflow_speed_m_s: None,

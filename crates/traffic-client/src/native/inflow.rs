@@ -1,5 +1,7 @@
 //! Where vehicles come from: the first fill of the road, and arrivals at the entries.
 
+use tractrix_core::VehicleClass;
+
 use super::driver::Driver;
 use super::engine::{Engine, TICK_S};
 use super::equilibrium::{critical_speed_m_s, easy_speed_m_s};
@@ -23,10 +25,30 @@ impl Engine {
         exits.filter(move |&k| self.map.lanes[k as usize].s_start_m > s_m)
     }
 
-    fn draw(&self, id: u64, s_m: f64) -> Driver {
+    fn draw(&self, id: u64, s_m: f64, lane: u16) -> Driver {
         let share = self.config.schedule.at(self.time_s(), None, |step| step.truck_share_frac);
         let share = share.unwrap_or(self.config.truck_share_frac);
+        let share = self.truck_share_of_lane(share, s_m, lane);
         Driver::draw(&self.config, share, id, self.exits_after(s_m))
+    }
+
+    /// Share of trucks in a lane of which all lanes together have `share`: those that keep out of the
+    /// left lane are in the others.
+    fn truck_share_of_lane(&self, share: f64, s_m: f64, lane: u16) -> f64 {
+        let map = &self.map;
+        let through = || {
+            let is_here = |&k: &u16| {
+                let l = &map.lanes[k as usize];
+                l.usage == LaneUse::Through && s_m >= l.s_start_m && s_m <= l.s_end_m
+            };
+            (0..map.lanes.len() as u16).filter(is_here)
+        };
+        if self.is_closed_to(lane, VehicleClass::Truck) {
+            return 0.0;
+        }
+        let open = through().filter(|&k| !self.is_closed_to(k, VehicleClass::Truck)).count();
+        let is_through = through().any(|k| k == lane);
+        if is_through { (share * through().count() as f64 / open as f64).min(1.0) } else { share }
     }
 
     /// Fills the through lanes with the configured density. Spacings vary by a factor; where they
@@ -45,7 +67,7 @@ impl Engine {
             let mut ahead: Option<(f64, f64)> = None;
             for position in 0u64.. {
                 let id = self.state.next_id;
-                let driver = self.draw(id, front_m);
+                let driver = self.draw(id, front_m, k as u16);
                 let draws = Draws::new(self.config.seed, Stream::Fill, position);
                 let spacing = (0.3 + 1.4 * draws.uniform(k as u32)) * 1000.0 / density;
                 let desired =
@@ -111,7 +133,7 @@ impl Engine {
     fn enter(&mut self, k: u16) -> bool {
         let lane = &self.map.lanes[k as usize];
         let id = self.state.next_id;
-        let driver = self.draw(id, lane.s_start_m);
+        let driver = self.draw(id, lane.s_start_m, k);
         let s_m = lane.s_start_m + driver.length_m;
         let limit_m_s = lane.limit_m_s(s_m).min(self.limit_m_s);
         let desired = driver.idm.desired_speed_m_s.min(limit_m_s * driver.limit_factor);

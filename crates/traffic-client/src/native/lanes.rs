@@ -161,6 +161,18 @@ fn lower_limits(limit_m_s: &[f64], s_start_m: f64) -> Vec<(f64, f64)> {
         .collect()
 }
 
+/// Is a lane at its start the leftmost of three or more through lanes?
+fn is_left_of_three(lanes: &[Lane], k: u16) -> bool {
+    let s_m = lanes[k as usize].s_start_m;
+    let beside = |k: u16| {
+        let lane = lanes.get(k as usize).filter(|l| l.usage == LaneUse::Through)?;
+        (s_m >= lane.s_start_m && s_m <= lane.s_end_m).then(|| lane.section(s_m).beside)
+    };
+    let to_the_right = |k: u16| beside(k).map(|(_, right)| right);
+    beside(k).is_some_and(|(left, _)| beside(left).is_none())
+        && to_the_right(k).and_then(to_the_right).and_then(beside).is_some()
+}
+
 /// All lanes and the grade.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct LaneMap {
@@ -172,6 +184,7 @@ pub(crate) struct LaneMap {
     pub(crate) s_end_m: f64,
     sin_grade: Vec<f64>,
     ends_early: Vec<bool>,
+    left_of_three: Vec<bool>,
 }
 
 impl LaneMap {
@@ -192,7 +205,13 @@ impl LaneMap {
             .iter()
             .map(|lane| (lane.drops || lane.leaves) && lane.s_end_m < s_end_m - 1.0)
             .collect();
-        Self { lanes, exits, s_start_m, s_end_m, sin_grade, ends_early }
+        let left_of_three = (0..lanes.len()).map(|k| is_left_of_three(&lanes, k as u16)).collect();
+        Self { lanes, exits, s_start_m, s_end_m, sin_grade, ends_early, left_of_three }
+    }
+
+    /// Is it the leftmost of three or more lanes?
+    pub(crate) fn is_left_of_three(&self, lane: u16) -> bool {
+        self.left_of_three[lane as usize]
     }
 
     /// Sine of the grade angle, positive uphill.
