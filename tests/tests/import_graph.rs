@@ -24,17 +24,7 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("recording", vec!["tractrix-core", "road"]),
         ("sim", plant.clone()),
         ("diagnosis", vec!["tractrix-core", "road", "dynamics", "tractrix-j1939"]),
-        (
-            "truck-node",
-            vec![
-                "tractrix-core",
-                "road",
-                "driver-models",
-                "planner",
-                "tractrix-j1939",
-                "recording",
-            ],
-        ),
+        ("truck-node", vec!["tractrix-core", "road", "planner", "tractrix-j1939", "recording"]),
         ("tractrix-python", [&plant[..], &["sim", "diagnosis"]].concat()),
         ("sim-server", [plant, vec!["sim", "diagnosis", "recording"]].concat()),
     ])

@@ -12,6 +12,42 @@ pub const CI: u32 = 65_259;
 /// Software identification: a count, then as many fields.
 pub const SOFT: u32 = 65_242;
 
+/// A vehicle identification number with nothing but its maker: what a report may show.
+pub fn masked(vin: &str) -> impl Iterator<Item = char> {
+    vin.chars().enumerate().map(|(at, letter)| if at < MAKER_LENGTH { letter } else { '*' })
+}
+
+/// Letters of a vehicle identification number that name the maker (ISO 3780).
+const MAKER_LENGTH: usize = 3;
+
+/// A vehicle identification number: printable ASCII.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Vin {
+    bytes: [u8; VIN_MAX],
+    len: usize,
+}
+
+/// Characters of the longest number that is kept; the standard's has 17 (ISO 3779).
+const VIN_MAX: usize = 32;
+
+impl Vin {
+    /// The number in a VI message; none for an empty one, one that is no text or too long.
+    #[must_use]
+    pub fn of(id: Id, bytes: &[u8]) -> Option<Self> {
+        let text = fields(id, bytes).next()?.ok()?.as_bytes();
+        let mut vin = Self { bytes: [0; VIN_MAX], len: text.len() };
+        vin.bytes.get_mut(..text.len())?.copy_from_slice(text);
+        (vin.len > 0).then_some(vin)
+    }
+
+    /// The number.
+    #[must_use]
+    pub fn as_str(&self) -> &str {
+        let text = self.bytes.get(..self.len).unwrap_or_default();
+        core::str::from_utf8(text).unwrap_or_default()
+    }
+}
+
 /// What ends a field.
 const DELIMITER: u8 = b'*';
 

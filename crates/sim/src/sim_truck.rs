@@ -106,6 +106,11 @@ impl SimTruck {
         &self.plant
     }
 
+    /// The road that it is on.
+    pub(crate) fn road(&self) -> &Road {
+        &self.road
+    }
+
     /// The truck model.
     #[must_use]
     pub fn model(&self) -> &TruckModel {

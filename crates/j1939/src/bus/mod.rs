@@ -46,6 +46,12 @@ pub trait Bus {
     /// # Errors
     /// When the bus cannot be used at present, or a log cannot be read.
     fn receive(&mut self, now: Time) -> Result<Option<Stamped<Frame>>, BusError>;
+
+    /// Error frames of the controller so far: many of them and no other frame are a wrong bit rate
+    /// or wrong wiring. A bus without a controller has none.
+    fn error_frames(&self) -> u64 {
+        0
+    }
 }
 
 impl<B: Bus + ?Sized> Bus for &mut B {
@@ -55,6 +61,10 @@ impl<B: Bus + ?Sized> Bus for &mut B {
 
     fn receive(&mut self, now: Time) -> Result<Option<Stamped<Frame>>, BusError> {
         (**self).receive(now)
+    }
+
+    fn error_frames(&self) -> u64 {
+        (**self).error_frames()
     }
 }
 
@@ -66,5 +76,9 @@ impl<B: Bus + ?Sized> Bus for Box<B> {
 
     fn receive(&mut self, now: Time) -> Result<Option<Stamped<Frame>>, BusError> {
         (**self).receive(now)
+    }
+
+    fn error_frames(&self) -> u64 {
+        (**self).error_frames()
     }
 }

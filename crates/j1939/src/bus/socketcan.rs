@@ -167,6 +167,10 @@ impl Bus for SocketCan {
         }
         if self.off { Err(BusError::Off) } else { Ok(None) }
     }
+
+    fn error_frames(&self) -> u64 {
+        self.counts.errors
+    }
 }
 
 /// Identifier and mask for data frames of one parameter group, whatever priority and addresses.

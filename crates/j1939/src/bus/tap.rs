@@ -43,6 +43,10 @@ impl<B: Bus, F: FnMut(Direction, &Stamped<Frame>)> Bus for Tap<B, F> {
         }
         Ok(heard)
     }
+
+    fn error_frames(&self) -> u64 {
+        self.bus.error_frames()
+    }
 }
 
 #[cfg(all(test, feature = "std"))]

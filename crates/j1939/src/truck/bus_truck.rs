@@ -12,9 +12,10 @@ use super::heard::Heard;
 use super::send::{SendError, Sender, Situation};
 use super::{BusTruckConfig, Engagement, Lead, watch};
 use crate::bus::{Bus, BusError};
+use crate::ident::Vin;
 use crate::steering::{ExampleSteering, SteeringLink};
 use crate::supervise::{BusEvent, BusFault};
-use crate::{AddressClaim, BitRate, J1939Error, TpEvent, Transport};
+use crate::{AddressClaim, BitRate, ClaimState, J1939Error, Request, TpEvent, Transport};
 
 /// Frames that are taken from the bus in one tick; what is beyond waits for the next.
 const FRAMES_A_TICK: usize = 4096;
@@ -36,6 +37,27 @@ pub enum TruckError<P: core::error::Error> {
     /// A command cannot be said on the bus.
     #[error(transparent)]
     Frame(J1939Error),
+}
+
+/// What driving over a bus needs besides fresh signals. `None`: not told yet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Readiness {
+    /// Whether the address is ours.
+    pub claim: ClaimState,
+    /// Frames of others so far.
+    pub frames: u64,
+    /// Torque that the shares in EEC1 and TSC1 refer to, Nm (EC1).
+    pub reference_torque_nm: Option<f64>,
+    /// Whether the brakes take every demand (EBC5).
+    pub brakes_accept: Option<bool>,
+    /// Whether the engine takes the demands of an automated driving system (ADSS).
+    pub engine_accepts: Option<bool>,
+    /// Whether a position has come by satellite (VP1).
+    pub has_fix: bool,
+    /// The truck's number (VI), once somebody has asked the engine for it.
+    pub vin: Option<Vin>,
+    /// Mass of the combination, kg (CVW), once somebody has asked the brakes for it.
+    pub mass_kg: Option<f64>,
 }
 
 /// A truck on a bus `B` whose pose comes from `P` and whose steering understands `S`.
@@ -65,7 +87,8 @@ pub struct BusTruck<B, P, S = ExampleSteering> {
     fuel_until: Option<Time>,
     status: VehicleStatus,
     now: Option<Time>,
-    bus_fault: bool,
+    bus_error: Option<BusError>,
+    stopping: bool,
 }
 
 impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
@@ -104,7 +127,8 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
             fuel_until: None,
             status: VehicleStatus::default(),
             now: None,
-            bus_fault: false,
+            bus_error: None,
+            stopping: false,
         })
     }
 
@@ -116,7 +140,50 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
 
     /// The driver's wish to drive himself: the next command lets go of the truck.
     pub fn disengage(&mut self, now: Time) {
+        self.stopping = false;
         self.clutch.release(now);
+    }
+
+    /// Asks for the minimal-risk manoeuvre, as if something were wrong: it lasts until the driver
+    /// takes over or [`Self::disengage`]. Nothing happens while the driver drives.
+    pub fn stop(&mut self, now: Time) {
+        self.clutch.stop(now);
+        self.stopping = self.clutch.state().actuates();
+    }
+
+    /// Asks a controller, or all of them, for a parameter group; [`Self::readiness`] has what they
+    /// answer about the truck. Without an address of its own nothing is sent.
+    ///
+    /// # Errors
+    /// When the bus cannot be used, or has no room at present.
+    pub fn ask(&mut self, now: Time, pgn: u32, da: u8) -> Result<(), BusError> {
+        let Some(sa) = self.claim.address() else { return Ok(()) };
+        match (Request { pgn, da, sa }).frame() {
+            Ok(frame) => self.bus.send(now, &frame),
+            // No such group: there is nobody who could answer
+            Err(_) => Ok(()),
+        }
+    }
+
+    /// What driving over the bus needs besides fresh signals, as of the last [`Vehicle::ego`].
+    #[must_use]
+    pub fn readiness(&self) -> Readiness {
+        Readiness {
+            claim: self.claim.state(),
+            frames: self.heard.frames,
+            reference_torque_nm: self.heard.reference_nm.map(|nm| nm.value),
+            brakes_accept: self.heard.xbr_state.map(|state| state.value == 0),
+            engine_accepts: self.heard.engine_ready.map(|ready| ready.value),
+            has_fix: self.heard.fix.is_some(),
+            vin: self.heard.vin,
+            mass_kg: self.heard.mass_kg.map(|mass| mass.value),
+        }
+    }
+
+    /// Why the bus could not be used in the last [`Vehicle::ego`].
+    #[must_use]
+    pub const fn bus_error(&self) -> Option<&BusError> {
+        self.bus_error.as_ref()
     }
 
     /// Who drives.
@@ -266,7 +333,7 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
         for event in self.supervisor.events() {
             status.raise(fault_of(event.fault), event.since);
         }
-        if self.bus_fault {
+        if self.bus_error.is_some() {
             status.raise(VehicleFault::BusOff, now);
         }
         let present = |fault| status.since(fault).is_some();
@@ -290,7 +357,8 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
         if !self.clutch.state().actuates() {
             status.raise(VehicleFault::DriverOverride, self.clutch.since());
         }
-        if !conditions.claimed || !conditions.accepted {
+        self.stopping &= self.clutch.state().actuates();
+        if !conditions.claimed || !conditions.accepted || self.stopping {
             status.raise(VehicleFault::NotReady, now);
         }
         for known in self.status.faults() {
@@ -327,7 +395,7 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> Vehicle for BusTruck<B, P, S> {
             let passed_s = now.seconds_since(last);
             !(0.0..=TICK_MAX_S).contains(&passed_s)
         });
-        self.bus_fault = self.receive(now).is_err();
+        self.bus_error = self.receive(now).err();
         self.supervisor.poll(now);
         self.meter_fuel(now);
         self.tell_pose();

@@ -56,7 +56,8 @@ pub(super) struct Clutch {
     since: Time,
     /// The driver's wish to engage, valid for the next tick.
     wished: bool,
-    /// An intruder was there: only a new engagement ends the minimal-risk manoeuvre.
+    /// An intruder was there, or a stop is asked for: only a new engagement ends the minimal-risk
+    /// manoeuvre.
     latched: bool,
 }
 
@@ -72,6 +73,14 @@ impl Clutch {
 
     pub(super) const fn wish(&mut self) {
         self.wished = true;
+    }
+
+    /// Brings the truck to a stop, if the system drives.
+    pub(super) fn stop(&mut self, now: Time) {
+        if self.state.actuates() {
+            self.latched = true;
+            self.set(now, Engagement::MinimalRisk);
+        }
     }
 
     pub(super) fn release(&mut self, now: Time) {
@@ -210,6 +219,29 @@ mod tests {
         clutch.update(Time(11), GOOD);
         clutch.update(Time(12), GOOD);
         assert_eq!(clutch.state(), Engagement::Engaged);
+    }
+
+    #[test]
+    fn a_stop_lasts_until_the_truck_is_let_go_or_the_driver_takes_it() {
+        let mut idle = Clutch::default();
+        idle.stop(Time(0));
+        assert_eq!(idle.state(), Engagement::Off);
+        for by_the_driver in [false, true] {
+            let mut clutch = engaged();
+            clutch.stop(Time(2));
+            for i in 3..9 {
+                clutch.wish();
+                clutch.update(Time(i), GOOD);
+                assert_eq!(clutch.state(), Engagement::MinimalRisk);
+            }
+            if by_the_driver {
+                clutch.update(Time(9), Conditions { driver: true, ..GOOD });
+                assert_eq!(clutch.state(), Engagement::Override);
+            } else {
+                clutch.release(Time(9));
+                assert_eq!(clutch.state(), Engagement::Off);
+            }
+        }
     }
 
     #[test]

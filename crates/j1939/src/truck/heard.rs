@@ -3,9 +3,10 @@
 use tractrix_core::{Fix, PowertrainLimits, SafetySignal, Stamped, Time};
 
 use super::{BusTruckConfig, Torque};
+use crate::ident::{self, Vin};
 use crate::message::{
-    Acc1, Adss, Ebc1, Ebc3, Ebc5, Ec1, Eec1, Eec2, Eec3, Erc1, Etc1, Etc2, Hrw, Lfe1, Rc, Vdc2,
-    Vds, Vp1,
+    Acc1, Adss, Cvw, Ebc1, Ebc3, Ebc5, Ec1, Eec1, Eec2, Eec3, Erc1, Etc1, Etc2, Hrw, Lfe1, Rc,
+    Vdc2, Vds, Vp1,
 };
 use crate::{Frame, Id, J1939Error, Message, Slot, TpMessage};
 
@@ -51,6 +52,12 @@ pub(super) struct Heard {
     pub engine_ready: Option<Stamped<bool>>,
     pub lead: Option<Stamped<Option<Lead>>>,
     pub fix: Option<Stamped<Fix>>,
+    /// Told on request alone.
+    pub vin: Option<Vin>,
+    /// Mass of the combination, told on request alone.
+    pub mass_kg: Option<Stamped<f64>>,
+    /// Frames of others.
+    pub frames: u64,
     bearing_rad: Option<Stamped<f64>>,
     /// Messages that were too short to decode.
     pub short: u64,
@@ -66,6 +73,7 @@ fn take<T>(now: Time, slot: Slot<T>, field: &mut Option<Stamped<T>>) {
 impl Heard {
     /// Takes a frame, whatever it is.
     pub(super) fn on_frame(&mut self, now: Time, frame: &Frame, config: &BusTruckConfig) {
+        self.frames += 1;
         let known = self.read(now, frame.id(), frame.bytes(), config);
         self.short += u64::from(known.is_err());
     }
@@ -144,6 +152,7 @@ impl Heard {
             pgn if pgn == Ec1::TABLE.pgn => {
                 take(now, Ec1::decode(id, bytes)?.reference_torque_nm, &mut self.reference_nm);
             }
+            ident::VI => self.vin = Vin::of(id, bytes),
             pgn if pgn == Lfe1::TABLE.pgn => {
                 take(now, Lfe1::decode(id, bytes)?.fuel_rate_m3_s, &mut self.fuel_rate_m3_s);
             }
@@ -195,6 +204,9 @@ impl Heard {
                 if let Some(value) = mean(&wheels) {
                     self.brake_pressure_pa = Some(Stamped { time: now, value });
                 }
+            }
+            pgn if pgn == Cvw::TABLE.pgn => {
+                take(now, Cvw::decode(id, bytes)?.combination_mass_kg, &mut self.mass_kg);
             }
             pgn if pgn == Ebc5::TABLE.pgn => {
                 let m = Ebc5::decode(id, bytes)?;

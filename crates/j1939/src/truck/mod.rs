@@ -23,7 +23,7 @@ mod send;
 mod torque;
 mod watch;
 
-pub use bus_truck::{BusTruck, TruckError};
+pub use bus_truck::{BusTruck, Readiness, TruckError};
 pub use config::{BusTruckConfig, lost_after_s};
 pub use demand::{
     Urgency, XBR_DECEL_MAX_M_S2, brake_demand, brakes_asked, engine_demand, gear_asked,

@@ -90,6 +90,35 @@ impl MapProjection {
         [cos * x + sin * y, cos * y - sin * x]
     }
 
+    /// Latitude and longitude, degrees, of a map point: [`Self::to_map_m`] turned round by Newton's
+    /// method, below a millimetre. `None` where that does not come to an end: far outside of the
+    /// projection's range, or for what is no number.
+    #[must_use]
+    pub fn on_earth_deg(&self, x_m: f64, y_m: f64) -> Option<[f64; 2]> {
+        // A degree for the differences would be too coarse, less than this drowns in rounding
+        const STEP_DEG: f64 = 1e-6;
+        let mut at = [0.0, self.lon_0_rad.to_degrees()];
+        for _ in 0..30 {
+            let [x, y] = self.to_map_m(at[0], at[1]);
+            let (dx, dy) = (x_m - x, y_m - y);
+            if libm::hypot(dx, dy) < 1e-5 {
+                return Some(at);
+            }
+            let north = self.to_map_m(at[0] + STEP_DEG, at[1]);
+            let east = self.to_map_m(at[0], at[1] + STEP_DEG);
+            let [xn, yn, xe, ye] = [north[0] - x, north[1] - y, east[0] - x, east[1] - y];
+            let det = xn * ye - xe * yn;
+            let latitude = at[0] + STEP_DEG * (dx * ye - dy * xe) / det;
+            let longitude = at[1] + STEP_DEG * (dy * xn - dx * yn) / det;
+            // Steps from the equator may shoot over a pole
+            at = [latitude.clamp(-89.9, 89.9), longitude];
+            if !(at[0].is_finite() && at[1].is_finite()) {
+                return None;
+            }
+        }
+        None
+    }
+
     /// Heading of true north on the map, rad, counter-clockwise from x.
     #[must_use]
     pub fn north_rad(&self, latitude_deg: f64, longitude_deg: f64) -> f64 {

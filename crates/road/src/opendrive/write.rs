@@ -7,7 +7,7 @@ use super::elements::elements;
 use super::model::{Header, Lane, LaneOutline, LaneSection, Network, RoadRecord};
 use super::xml_out::Xml;
 use crate::cubics::Span;
-use crate::{Cubics, GeoReference, LaneKind, Road};
+use crate::{Cubics, LaneKind, Road};
 
 impl Network {
     /// The network as OpenDRIVE. Records that are not read are not written.
@@ -22,14 +22,14 @@ impl Network {
 
 impl Road {
     /// The road as OpenDRIVE: its lanes are the right lanes of road `1`, the leftmost is lane -1;
-    /// spaces between lanes become lanes of type `none`.
+    /// spaces between lanes become lanes of type `none`. Where it lies on the earth is kept.
     #[must_use]
     pub fn write_opendrive(&self) -> String {
         let header = Header {
             rev_major: 1,
             rev_minor: 6,
             name: self.name().into(),
-            geo_reference: GeoReference::default(),
+            geo_reference: self.geo_reference().cloned().unwrap_or_default(),
         };
         let mut out = Xml::new(&header);
         out.road(&record_of(self));

@@ -3,9 +3,10 @@
 use j1939::Slot;
 use j1939::message::{
     Acc1, Adss, Air1, Amb, Ccvs1, Cvw, Ebc1, Ebc2, Ebc3, Ebc5, Ec1, Eec1, Eec2, Eec3, Erc1, Et1,
-    Etc1, Etc2, Hrw, Lfe1, Rc, Sas, Vdc1, Vdc2, Vdhr,
+    Etc1, Etc2, Hrw, Lfe1, Rc, Sas, Vdc1, Vdc2, Vdhr, Vds, Vp1,
 };
 use j1939::truck::{Torque, XBR_DECEL_MAX_M_S2};
+use planner::localise::MapProjection;
 use tractrix_core::{
     BrakeMode, EgoState, Geometry, PowertrainLimits, Scene, Vehicle, VehicleLimits,
 };
@@ -46,7 +47,12 @@ pub(super) struct Snapshot<'a> {
     pub(super) engine_master: Option<u8>,
     pub(super) retarder_master: Option<u8>,
     pub(super) brake_mode: BrakeMode,
+    /// Where the map lies on the earth.
+    pub(super) projection: Option<&'a MapProjection>,
 }
+
+/// Below this speed a receiver's course is noise, m/s.
+const COURSE_FROM_M_S: f64 = 1.0;
 
 /// A code that says "other" in the torque modes of engines and retarders (SPN 899, 900).
 const OTHER: u8 = 14;
@@ -297,6 +303,33 @@ impl Snapshot<'_> {
             powered_vehicle_mass_kg: Slot::Value(limits.lateral.tractor_mass_kg),
             combination_mass_kg: Slot::Value(limits.road_load.mass_kg),
         }
+    }
+
+    /// The satellite receiver, whose antenna is at the reference point; none where the map does not
+    /// say where it lies on the earth.
+    pub(super) fn vp1(&self) -> Option<Vp1> {
+        let [latitude_deg, longitude_deg] =
+            self.projection?.on_earth_deg(self.ego.x_m, self.ego.y_m)?;
+        Some(Vp1 {
+            latitude_rad: Slot::Value(latitude_deg.to_radians()),
+            longitude_rad: Slot::Value(longitude_deg.to_radians()),
+        })
+    }
+
+    /// The receiver's course over ground; a truck that stands has none.
+    pub(super) fn vds(&self) -> Option<Vds> {
+        let (ego, projection) = (self.ego, self.projection?);
+        let [latitude_deg, longitude_deg] = projection.on_earth_deg(ego.x_m, ego.y_m)?;
+        let moves = ego.speed_m_s.abs() > COURSE_FROM_M_S;
+        let heading_rad = ego.yaw_rad + libm::atan2(ego.lateral_speed_m_s, ego.speed_m_s);
+        let course_rad = projection.north_rad(latitude_deg, longitude_deg) - heading_rad;
+        let turn = 2.0 * core::f64::consts::PI;
+        let bearing_rad = course_rad - turn * libm::floor(course_rad / turn);
+        Some(Vds {
+            bearing_rad: if moves { Slot::Value(bearing_rad) } else { Slot::NotAvailable },
+            altitude_m: Slot::Value(ego.z_m),
+            ..Vds::default()
+        })
     }
 
     pub(super) fn sas(&self) -> Sas {

@@ -25,6 +25,7 @@ use j1939::check::{Carrier, Sealer};
 use j1939::dm::Dtc;
 use j1939::message::{Cvw, Message};
 use j1939::{ACKNOWLEDGMENT_PGN, ADDRESS_CLAIMED_PGN, GLOBAL_ADDRESS, Id, Request, ident};
+use planner::localise::MapProjection;
 use tractrix_core::{Command, EgoState, Stamped, Time, Vehicle};
 
 pub use config::{EcuConfig, Unit};
@@ -76,6 +77,8 @@ pub struct EcuSim<B> {
     /// Bus time at which the truck was let go; before it, it is held where it stands or rolls.
     let_go: Option<Time>,
     refused: u64,
+    /// What the satellite receiver tells the place with.
+    projection: Option<MapProjection>,
 }
 
 impl<B> Simulated for EcuSim<B> {
@@ -98,7 +101,11 @@ impl<B: Bus> EcuSim<B> {
         let_go: Option<Time>,
     ) -> Result<Self, SimError> {
         let ego = truck.ego(Time::ZERO)?;
+        // A map that is nowhere on the earth has no satellites
+        let reference = truck.road().geo_reference();
+        let projection = reference.and_then(|reference| MapProjection::new(reference).ok());
         Ok(Self {
+            projection,
             bus,
             units: Unit::ALL.map(|unit| ControlUnit::new(unit, start)),
             demands: Demands::new(config, ego.value.steering_wheel_rad),
@@ -248,6 +255,7 @@ impl<B: Bus> EcuSim<B> {
             engine_master: self.demands.engine_master(now),
             retarder_master: self.demands.retarder_master(now),
             brake_mode: self.demands.brake_mode(now),
+            projection: self.projection.as_ref(),
         }
     }
 
@@ -264,6 +272,7 @@ impl<B: Bus> EcuSim<B> {
         for (unit, message) in messages {
             match message {
                 Outgoing::Frame(frame) => put(now, &frame, &mut self.bus)?,
+                Outgoing::None => {}
                 Outgoing::Long(table, bytes, len) => {
                     let bytes = bytes.get(..len).unwrap_or(&bytes);
                     let unit = self.unit(unit);
@@ -305,7 +314,7 @@ impl<B: Bus> EcuSim<B> {
                 Some(Outgoing::Long(_, bytes, len)) => {
                     Some(bytes.get(..len).unwrap_or(&bytes).to_vec())
                 }
-                None => None,
+                Some(Outgoing::None) | None => None,
             },
         };
         match self.units.get_mut(at) {

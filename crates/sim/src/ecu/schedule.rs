@@ -2,7 +2,7 @@
 
 use j1939::message::{
     Acc1, Adss, Air1, Amb, Ccvs1, Ebc1, Ebc2, Ebc3, Ebc5, Ec1, Eec1, Eec2, Eec3, Erc1, Et1, Etc1,
-    Etc2, Hrw, Lfe1, Message, Rc, Vdc1, Vdc2, Vdhr,
+    Etc2, Hrw, Lfe1, Message, Rc, Vdc1, Vdc2, Vdhr, Vds, Vp1,
 };
 use j1939::{Frame, GLOBAL_ADDRESS, J1939Error, MessageTable};
 use tractrix_core::Time;
@@ -17,6 +17,8 @@ pub(super) const LONGEST_BYTES: usize = 40;
 pub(super) enum Outgoing {
     /// One frame.
     Frame(Frame),
+    /// Nothing: the truck does not know it.
+    None,
     /// For the transport: its table and its bytes.
     Long(&'static MessageTable, [u8; LONGEST_BYTES], usize),
 }
@@ -31,7 +33,7 @@ struct Entry {
 
 /// Everything but SAS, which counts, and DM1. Ten-millisecond messages go in the middle of a tick of 10 ms;
 /// slow ones have phases of their own, so that they do not meet.
-const ENTRIES: [Entry; 23] = [
+const ENTRIES: [Entry; 25] = [
     entry::<Eec1>(Unit::Engine, 5, |s, sa| short(&s.eec1(), sa)),
     entry::<Eec2>(Unit::Engine, 5, |s, sa| short(&s.eec2(), sa)),
     entry::<Eec3>(Unit::Engine, 35, |s, sa| short(&s.eec3(), sa)),
@@ -55,6 +57,8 @@ const ENTRIES: [Entry; 23] = [
     entry::<Ccvs1>(Unit::Cab, 5, |s, sa| short(&s.ccvs1(), sa)),
     entry::<Amb>(Unit::Cab, 140, |s, sa| short(&s.amb(), sa)),
     entry::<Vdhr>(Unit::Cab, 150, |s, sa| short(&s.vdhr(), sa)),
+    entry::<Vds>(Unit::Cab, 165, |s, sa| known(s.vds(), sa)),
+    entry::<Vp1>(Unit::Cab, 175, |s, sa| known(s.vp1(), sa)),
 ];
 
 const fn entry<M: Message>(
@@ -67,6 +71,10 @@ const fn entry<M: Message>(
 
 fn short<M: Message>(message: &M, sa: u8) -> Result<Outgoing, J1939Error> {
     Ok(Outgoing::Frame(message.frame(GLOBAL_ADDRESS, sa)?))
+}
+
+fn known<M: Message>(message: Option<M>, sa: u8) -> Result<Outgoing, J1939Error> {
+    message.map_or(Ok(Outgoing::None), |message| short(&message, sa))
 }
 
 fn long<M: Message>(message: &M) -> Result<Outgoing, J1939Error> {

@@ -23,8 +23,6 @@ pub(super) const OTHER_SIGNALS: [&str; 11] = [
     "unit",
     "software",
 ];
-/// Characters of a vehicle identification number that name the maker; the others name the truck.
-const MAKER_LENGTH: usize = 3;
 
 /// What a message says.
 #[derive(Debug, PartialEq)]
@@ -64,7 +62,10 @@ pub(super) fn read(id: Id, bytes: &[u8]) -> Option<(&'static str, Content)> {
     let (pgn, name) = *OTHERS.iter().find(|(pgn, _)| *pgn == id.pgn())?;
     let said = match pgn {
         DM1 | DM2 => trouble(id, bytes),
-        VI => texts(ident::fields(id, bytes).map(|vin| vin.map(masked)), &["vin"]),
+        VI => texts(
+            ident::fields(id, bytes).map(|vin| vin.map(|vin| ident::masked(vin).collect())),
+            &["vin"],
+        ),
         CI => texts(
             ident::fields(id, bytes).map(|field| field.map(str::to_owned)),
             &["make", "model", "serial", "unit"],
@@ -115,12 +116,6 @@ fn texts(
 
 fn text(name: &'static str, text: String) -> Item {
     Item { name, unit: "", slot: Slot::Value(Said::Text(text.into())) }
-}
-
-/// A vehicle identification number with nothing but its maker.
-fn masked(vin: &str) -> String {
-    let shown = |(at, letter)| if at < MAKER_LENGTH { letter } else { '*' };
-    vin.chars().enumerate().map(shown).collect()
 }
 
 #[cfg(test)]

@@ -1,0 +1,75 @@
+//! The virtual truck and the program that drives it: two processes, a bus between them, real time.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::disallowed_methods, reason = "a test waits")]
+
+mod support;
+
+use std::io::Read;
+use std::net::TcpStream;
+
+use support::{Files, Wire, number_after};
+
+/// Engages, follows what drives ahead, and stops when it is asked to end.
+fn drives_and_stops(bus: &str, drive_s: f64) {
+    let files = Files::new(3.0);
+    let (out, health) = (files.path("out"), free_address());
+    let mut truck = files.truck(bus);
+    truck.until("is held until it is driven");
+    let words = ["--engage-after-checks", "--out", &out, "--health", &health];
+    let mut node = files.node(bus, &words);
+    node.until("ready");
+    let engaged = node.until("engaged");
+    let start_s = engaged.split(' ').next().unwrap().parse::<f64>().unwrap();
+    let state = loop {
+        let state = state_of(&health);
+        if state["time_s"].as_f64().unwrap() > start_s + drive_s {
+            break state;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    };
+    println!("{state}");
+    assert_eq!(state["engagement"], "engaged", "{state}");
+    assert!(state["speed_m_s"].as_f64().unwrap() > 1.0, "{state}");
+    let gap_m = state["lead"]["gap_m"].as_f64().unwrap();
+    assert!(gap_m > 5.0 && gap_m < 80.0, "{state}");
+    node.terminate();
+    node.until("asked to end: stops");
+    node.until("minimal risk");
+    node.until("stands");
+    let summary = node.until("let go at");
+    println!("{summary}");
+    let (status, said) = node.end();
+    assert_eq!(status.code(), Some(0), "{said}");
+    assert!(number_after(&summary, "let go at") < 0.1, "{summary}");
+    assert!(number_after(&summary, "nearest") > 5.0, "{summary}");
+    truck.terminate();
+    let (status, said) = truck.end();
+    println!("{said}");
+    assert_eq!(status.code(), Some(0), "{said}");
+    assert!(said.contains(" 0 collisions"), "{said}");
+    assert!(std::path::Path::new(&out).join("run.mcap").exists());
+}
+
+/// A free port of this machine; somebody else may take it, but nobody here does.
+fn free_address() -> String {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    listener.local_addr().unwrap().to_string()
+}
+
+fn state_of(health: &str) -> serde_json::Value {
+    let mut text = String::new();
+    TcpStream::connect(health).unwrap().read_to_string(&mut text).unwrap();
+    serde_json::from_str(&text).unwrap_or_else(|e| panic!("{e}: {text:?}"))
+}
+
+#[test]
+fn drives_and_stops_over_a_server() {
+    let wire = Wire::new();
+    drives_and_stops(&wire.name, 4.0);
+}
+
+#[test]
+#[ignore = "needs CAN sockets: tests/can/uml.sh"]
+fn drives_and_stops_over_the_kernel() {
+    drives_and_stops("can:vcan0", 10.0);
+}
