@@ -43,6 +43,9 @@ pub mod steering;
 pub mod supervise;
 mod tp;
 pub mod truck;
+#[cfg(test)]
+#[path = "../tests/vectors/mod.rs"]
+mod vectors;
 mod wire;
 
 pub use address_set::AddressSet;

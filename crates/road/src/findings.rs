@@ -109,6 +109,7 @@ impl Road {
 }
 
 /// The findings that refuse a road, in one line; none if it can be driven on.
+#[cfg(any(feature = "std", test))]
 pub(crate) fn refusal(findings: &[Finding]) -> Option<String> {
     let refused: Vec<_> = findings.iter().filter(|f| f.severity == Severity::Refused).collect();
     let first = refused.first()?;
