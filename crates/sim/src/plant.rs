@@ -94,12 +94,14 @@ impl<B: Bus> Plant<EcuSim<B>> {
         Ok(plant.map_truck(|_| ecu))
     }
 
-    /// One tick: moves the control units to bus time `now`, and once the truck is let go truck and
+    /// One tick in wall time, which is `wall` by now and not before `now`: a tick that is made up
+    /// for says nothing. Moves the control units to bus time `now`, and once the truck is let go truck and
     /// traffic by one tick of the scenario. After the end it does nothing.
     ///
     /// # Errors
     /// [`SimError`] when the bus, the truck or the traffic source fails.
-    pub fn tick(&mut self, now: Time) -> Result<Status, SimError> {
+    pub fn tick(&mut self, now: Time, wall: Time) -> Result<Status, SimError> {
+        self.truck.say_nothing_late(wall);
         let ego = self.truck.advance(now)?.value;
         if self.status != Status::Running || self.truck.let_go().is_none() {
             return Ok(self.status);

@@ -7,6 +7,7 @@
 //! | `roll_call` | who is on the bus before anything is claimed |
 //! | `checks` | what must be in order before anything is actuated, and the report of it |
 //! | `node` | the loop: checks, driving, the stop at the end |
+//! | `live` | the bus in wall time |
 //! | `radar` | the vehicle ahead as a source of traffic |
 //! | `pose`, `nmea` | where the truck is |
 //! | `log` | the recording |
@@ -19,6 +20,7 @@ mod cli;
 mod clock;
 mod failure;
 mod health;
+mod live;
 mod log;
 mod nmea;
 mod node;

@@ -18,6 +18,7 @@ use crate::cli::{Args, Pose, bus_name};
 use crate::clock::Clock;
 use crate::failure::Failure;
 use crate::health::Health;
+use crate::live::Live;
 use crate::log::{self, Log};
 use crate::nmea::Fixes;
 use crate::output;
@@ -28,14 +29,14 @@ use crate::sheet::Sheet;
 use crate::watchdog::Watchdog;
 
 /// The truck behind its bus.
-pub(crate) type Truck = BusTruck<Box<dyn Bus + Send + Sync>, NodePose, ExampleSteering>;
+pub(crate) type Truck = BusTruck<Live<Box<dyn Bus + Send + Sync>>, NodePose, ExampleSteering>;
 
 /// Below this speed the truck stands, m/s; for so long, s.
 const STANDS_M_S: f64 = 0.05;
 const STANDS_S: f64 = 1.0;
 /// What is missing is told again at most so often, s.
 const TELL_S: f64 = 1.0;
-/// A bus that fails for so long while nothing is driven ends the program, s.
+/// A bus that fails for so long ends the program: nothing can be asked of the truck, s.
 const BUS_GONE_S: f64 = 5.0;
 
 /// What the program is about.
@@ -104,7 +105,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         signal_hook::flag::register(signal, Arc::clone(&asked_to_end)).map_err(Failure::work)?;
     }
     let name = bus_name(&args.can);
-    let mut bus = j1939::bus::open(&name).map_err(|e| Failure::input(format!("--can {e}")))?;
+    let bus = j1939::bus::open(&name).map_err(|e| Failure::input(format!("--can {e}")))?;
+    let mut bus = Live::new(bus, clock);
     let present = roll_call(&mut bus, clock, &name, sheet.bus.address)?;
     let checks = Checks::new(name, sheet.bus.clone(), limits.road_load.mass_kg, present);
     let truck = BusTruck::new(
@@ -285,8 +287,8 @@ impl Node<'_> {
         self.checks.look(now, &mut self.truck, radar_s)
     }
 
-    /// A bus that is gone for good: nothing can be driven, whoever started the program may start it
-    /// again. While it drives the minimal-risk manoeuvre goes on.
+    /// A bus that is gone for good: nothing reaches the truck, whose control units let go by
+    /// themselves, and whoever started the program may start it again.
     fn notice_lost_bus(&mut self, now: Time) -> Result<(), Failure> {
         let Some(error) = self.truck.bus_error() else {
             self.bus_failed = None;

@@ -69,7 +69,8 @@ impl Watchdog {
 
     /// The program ends in good order.
     pub(crate) fn end(&mut self) {
-        self.tell("STOPPING=1");
+        // Closing a recording may take longer than a tick may
+        self.tell("STOPPING=1\nWATCHDOG_USEC=60000000");
         if let Some(file) = &mut self.hardware {
             let _ = file.write_all(MAGIC_CLOSE);
         }

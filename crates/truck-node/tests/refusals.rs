@@ -4,9 +4,9 @@
 
 mod support;
 
-use std::process::Output;
+use std::process::{Command, Output};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use j1939::bus::Bus;
 use j1939::{AddressClaim, Frame, Id, Name};
@@ -198,4 +198,37 @@ fn another_truck_and_another_road_are_refused() {
     truck.terminate();
     let (_, said) = truck.end();
     assert!(said.contains("not driven"), "{said}");
+}
+
+/// A bus of the kernel on which a tool sends a frame again and again.
+fn beside(frame: [&str; 2], run: impl FnOnce() -> Output) -> Output {
+    let words = frame.map(str::to_owned);
+    let over = Arc::new(AtomicBool::new(false));
+    let ends = Arc::clone(&over);
+    let thread = std::thread::spawn(move || {
+        while !ends.load(Ordering::Relaxed) {
+            assert!(Command::new("cansend").args(&words).status().unwrap().success());
+        }
+    });
+    let output = run();
+    over.store(true, Ordering::Relaxed);
+    thread.join().unwrap();
+    output
+}
+
+#[test]
+#[ignore = "needs CAN sockets: tests/can/uml.sh"]
+fn a_bus_of_the_kernel_that_cannot_be_used_is_named() {
+    let files = Files::new(3.0);
+    let line = refusal(&run(&files, &["--can", "vcan2"]));
+    assert!(line.contains("vcan2: the interface is down; `ip link set vcan2 up"), "{line}");
+    let line = refusal(&run(&files, &["--can", "vcan9"]));
+    assert!(line.contains("vcan9: no such CAN interface"), "{line}");
+    let fd = ["vcan1", "18F00E00##1000102030405060708090A0B"];
+    let line = refusal(&beside(fd, || run(&files, &["--can", "vcan1"])));
+    assert!(line.contains("vcan1: CAN FD frames on this bus"), "{line}");
+    // a protocol violation, as a controller of another bit rate reports it (linux/can/error.h)
+    let error = ["vcan0", "20000008#0000020000000000"];
+    let line = refusal(&beside(error, || run(&files, &["--can", "vcan0"])));
+    assert!(line.contains("error frames and no other: wrong bit rate"), "{line}");
 }

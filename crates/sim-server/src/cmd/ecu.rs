@@ -54,7 +54,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         let due = tick.saturating_mul(ticks);
         std::thread::sleep(due.saturating_sub(start.elapsed()));
         let now = Time(i64::try_from(due.as_nanos()).unwrap_or(i64::MAX));
-        status = plant.tick(now).map_err(Failure::work)?;
+        let wall = i64::try_from(start.elapsed().as_nanos()).unwrap_or(i64::MAX);
+        status = plant.tick(now, Time(wall)).map_err(Failure::work)?;
         ticks = ticks.saturating_add(1);
         late += u64::from(start.elapsed() > due.saturating_add(tick));
     }

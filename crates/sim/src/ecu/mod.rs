@@ -42,6 +42,8 @@ use crate::{SimError, SimTruck, Simulated};
 const FRAMES_A_STEP: usize = 1024;
 /// Steps that a pause is made up for; beyond, the truck goes on from where it is.
 const STEPS_AT_ONCE: i64 = 400;
+/// In wall time messages are not sent that were due so many steps ago.
+const LATE_STEPS: i64 = 4;
 /// Failure modes of trouble codes (SAE J1939-73, appendix A): a network message comes at an abnormal
 /// rate, or is in error.
 const ABNORMAL_RATE: u8 = 9;
@@ -74,6 +76,8 @@ pub struct EcuSim<B> {
     start_s_m: f64,
     ego: Stamped<EgoState>,
     step: Time,
+    /// Messages that were due by then are not sent.
+    silent_until: Time,
     /// Bus time at which the truck was let go; before it, it is held where it stands or rolls.
     let_go: Option<Time>,
     refused: u64,
@@ -118,9 +122,17 @@ impl<B: Bus> EcuSim<B> {
             ego,
             truck,
             step: start,
+            silent_until: start,
             let_go,
             refused: 0,
         })
+    }
+
+    /// Control units in wall time: what a pause of the program kept from being said is not said any
+    /// more, as a unit that stood still would not either.
+    pub fn say_nothing_late(&mut self, now: Time) {
+        let step_ns = Time::from_seconds(SUBSTEP_S).0;
+        self.silent_until = now.plus_nanos(-LATE_STEPS * step_ns);
     }
 
     /// Moves units and truck to `now`, in steps of 5 ms, and tells the truck's state as its
@@ -207,7 +219,9 @@ impl<B: Bus> EcuSim<B> {
         }
         let command = self.command(now);
         self.truck.command(now, &command)?;
-        self.speak(now)?;
+        if now > self.silent_until {
+            self.speak(now)?;
+        }
         Ok(())
     }
 

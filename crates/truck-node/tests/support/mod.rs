@@ -131,6 +131,12 @@ impl Process {
         panic!("waited in vain for {words:?}: {:#?}", self.heard)
     }
 
+    /// All that it has said so far.
+    pub fn said(&mut self) -> String {
+        self.heard.extend(self.lines.try_iter());
+        self.heard.join("\n")
+    }
+
     /// Sends SIGTERM.
     pub fn terminate(&self) {
         let id = self.child.id().to_string();
