@@ -59,7 +59,9 @@ impl Command {
         self.numbers().iter().all(|(_, value)| value.is_finite())
     }
 
-    fn numbers(&self) -> [(&'static str, f64); 4] {
+    /// Every number of the command, with its name.
+    #[must_use]
+    pub fn numbers(&self) -> [(&'static str, f64); 4] {
         [
             ("accelerator_pedal_frac", self.accelerator_pedal_frac),
             ("xbr_decel_m_s2", self.xbr_decel_m_s2),

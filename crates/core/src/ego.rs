@@ -95,7 +95,9 @@ impl EgoState {
         self.numbers().iter().all(|(_, value)| value.is_finite())
     }
 
-    fn numbers(&self) -> [(&'static str, f64); 26] {
+    /// Every number of the state, with its name.
+    #[must_use]
+    pub fn numbers(&self) -> [(&'static str, f64); 26] {
         let p = &self.powertrain;
         [
             ("x_m", self.x_m),

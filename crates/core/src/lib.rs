@@ -39,14 +39,14 @@ pub use error::CoreError;
 pub use fuel::{FuelModel, LowLoadFuel, RPM_PER_RAD_S};
 pub use limits::{BrakeLimits, Geometry, LateralLimits, PowertrainLimits, VehicleLimits};
 pub use plan::{
-    GuardReason, LaneChangeReason, LaneChangeRefusal, Maneuver, PathPoint, Plan, PlanStatus,
-    SpeedPoint,
+    GuardReason, LaneChangeReason, LaneChangeRefusal, LaneChoice, Maneuver, PathPoint, Plan,
+    PlanStatus, SpeedPoint,
 };
 pub use pose::{Fix, Motion, Pose, PoseSource};
 pub use provenance::Provenance;
 pub use road_load::{RoadLoad, RoadPiece, Wind};
 pub use scene::{Neighbour, Scene, VehicleClass};
-pub use seams::{Recorder, Stamped, Tick, TrafficSource, Vehicle};
+pub use seams::{Recorder, Stamped, Step, Tick, TrafficSource, Vehicle};
 pub use status::{ActiveFault, SafetySignal, VehicleFault, VehicleStatus};
 pub use table::{Curve, Grid};
 pub use time::Time;

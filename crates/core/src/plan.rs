@@ -5,6 +5,19 @@ use serde::{Deserialize, Serialize};
 
 use crate::Command;
 
+/// A wish for a lane change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LaneChoice {
+    /// The lane on the left (the paper's -1).
+    Left,
+    /// This lane (0).
+    #[default]
+    Keep,
+    /// The lane on the right (1).
+    Right,
+}
+
 /// The manoeuvre that the stack is driving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

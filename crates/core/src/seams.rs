@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Command, EgoState, Plan, Scene, Time, VehicleLimits, VehicleStatus};
+use crate::{Command, EgoState, LaneChoice, Plan, Scene, Time, VehicleLimits, VehicleStatus};
 
 /// A value and the time at which it was true.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -60,10 +60,37 @@ pub struct Tick<'a> {
     pub plan: &'a Plan,
 }
 
+/// One step of the stack: all that it was given, and what it commanded. The same steps in the same
+/// order give the same commands.
+#[derive(Debug, Clone, Copy)]
+pub struct Step<'a> {
+    /// Time of the tick.
+    pub now: Time,
+    /// The truck's state; `None`: it could not be read.
+    pub ego: Option<&'a Stamped<EgoState>>,
+    /// What is wrong with the truck.
+    pub status: &'a VehicleStatus,
+    /// The other vehicles; `None`: the traffic source failed, or the truck could not be read.
+    pub scene: Option<&'a Scene>,
+    /// What the truck can do.
+    pub limits: &'a VehicleLimits,
+    /// Limit on the whole road beside its own ones, m/s.
+    pub limit_cap_m_s: Option<f64>,
+    /// The driver's set speed, m/s.
+    pub set_speed_m_s: f64,
+    /// The lane change that is wished from outside and was not looked at yet.
+    pub wish: LaneChoice,
+    /// The command.
+    pub command: &'a Command,
+}
+
 /// Takes one record per tick. Recording never changes the run: `()` records nothing.
 pub trait Recorder {
     /// Takes the record. A recorder keeps its own failure and reports it when it is finished.
     fn record(&mut self, tick: &Tick<'_>);
+    /// Takes the step of the stack, before its command is delivered; also that of a tick in which
+    /// the truck or the traffic failed, which has no record.
+    fn step(&mut self, _step: &Step<'_>) {}
 }
 
 impl Recorder for () {
@@ -75,10 +102,19 @@ impl<A: Recorder, B: Recorder> Recorder for (A, B) {
         self.0.record(tick);
         self.1.record(tick);
     }
+
+    fn step(&mut self, step: &Step<'_>) {
+        self.0.step(step);
+        self.1.step(step);
+    }
 }
 
 impl<R: Recorder + ?Sized> Recorder for &mut R {
     fn record(&mut self, tick: &Tick<'_>) {
         (**self).record(tick);
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        (**self).step(step);
     }
 }

@@ -2,7 +2,9 @@
 
 use crate::Stack;
 use road::Road;
-use tractrix_core::{EgoState, Maneuver, Recorder, Stamped, Tick, Time, TrafficSource, Vehicle};
+use tractrix_core::{
+    EgoState, Maneuver, Recorder, Stamped, Step, Tick, Time, TrafficSource, Vehicle,
+};
 
 /// What a tick came to.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,27 +46,36 @@ pub fn drive_tick<V: Vehicle, T: TrafficSource, R: Recorder>(
     road: &Road,
     recorder: &mut R,
 ) -> Result<TickOutcome, DriveError<V::Error, T::Error>> {
-    let ego = match vehicle.ego(now) {
-        Ok(ego) => ego,
-        Err(error) => {
-            let plan = stack.minimal_risk(now, None, &vehicle.status(), road, vehicle.limits());
-            let command = plan.command;
-            vehicle.command(now, &command).map_err(DriveError::Command)?;
-            return Err(DriveError::Ego(error));
-        }
-    };
+    let read = vehicle.ego(now);
     let status = vehicle.status();
-    let scene = match traffic.advance(now, &ego.value) {
-        Ok(scene) => scene,
-        Err(error) => {
-            let plan = stack.minimal_risk(now, Some(&ego), &status, road, vehicle.limits());
-            let command = plan.command;
-            vehicle.command(now, &command).map_err(DriveError::Command)?;
-            return Err(DriveError::Traffic(error));
-        }
+    let ego = read.as_ref().ok().copied();
+    let seen = match read {
+        Ok(ego) => match traffic.advance(now, &ego.value) {
+            Ok(scene) => Ok((ego, scene)),
+            Err(error) => Err(DriveError::Traffic(error)),
+        },
+        Err(error) => Err(DriveError::Ego(error)),
     };
-    let plan = stack.tick(now, &ego, &status, scene, road, vehicle.limits());
+    let (ego, scene) = (ego.as_ref(), seen.as_ref().ok().map(|(_, scene)| *scene));
+    let (set_speed_m_s, wish) = (stack.config().set_speed_m_s, stack.wish());
+    let limits = vehicle.limits();
+    let plan = match (ego, scene) {
+        (Some(ego), Some(scene)) => stack.tick(now, ego, &status, scene, road, limits),
+        _ => stack.minimal_risk(now, ego, &status, road, limits),
+    };
+    recorder.step(&Step {
+        now,
+        ego,
+        status: &status,
+        scene,
+        limits,
+        limit_cap_m_s: road.limit_cap_m_s(),
+        set_speed_m_s,
+        wish,
+        command: &plan.command,
+    });
     vehicle.command(now, &plan.command).map_err(DriveError::Command)?;
+    let (ego, scene) = seen?;
     recorder.record(&Tick { now, ego: &ego.value, scene, plan });
     Ok(TickOutcome { ego, maneuver: plan.maneuver, guarded: !plan.guard.is_empty() })
 }

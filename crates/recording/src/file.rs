@@ -63,6 +63,11 @@ impl McapFile {
 
     /// Opens a topic.
     pub(crate) fn open(&mut self, topic: &Topic) -> Result<(), RecordingError> {
+        self.open_as(topic, topic.name)
+    }
+
+    /// Opens a topic under a name that only this file has.
+    pub(crate) fn open_as(&mut self, topic: &Topic, name: &str) -> Result<(), RecordingError> {
         let mut metadata = BTreeMap::new();
         if topic.is_latched {
             metadata.insert("offered_qos_profiles".to_owned(), LATCHED.to_owned());
@@ -70,7 +75,7 @@ impl McapFile {
         let id = self
             .writer
             .add_schema(topic.type_name, "ros2msg", topic.schema().as_bytes())
-            .and_then(|schema| self.writer.add_channel(schema, topic.name, "cdr", &metadata))
+            .and_then(|schema| self.writer.add_channel(schema, name, "cdr", &metadata))
             .map_err(|e| self.failed(e))?;
         self.channels.insert(topic.name, Channel { id, sequence: 0 });
         Ok(())

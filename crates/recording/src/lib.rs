@@ -4,13 +4,15 @@
 //! or a network alike ([`static_frames`] and [`lanes_at_start`] come before the first tick). [`Recording`] takes the ticks in the world's thread and hands them over a bounded
 //! channel to a writer thread; when the disk is slower than the world, the world waits: nothing is
 //! dropped. Chunks are closed every simulated second, so that a crash loses one second at most;
-//! [`recover`] makes a whole file of the rest. [`Reader`] reads fields by name.
+//! [`recover`] makes a whole file of the rest. [`Reader`] reads fields by name, [`Inputs`] what the
+//! stack and its bus were given.
 //!
 //! Message times are simulation time (nanoseconds since the start of the run), so that a recording
 //! of the same seed holds the same messages; the wall time of the start is in the metadata.
 
 mod error;
 mod file;
+mod inputs;
 pub mod lane_lines;
 mod layout;
 mod reader;
@@ -23,9 +25,23 @@ mod telemetry;
 mod topic;
 
 pub use error::RecordingError;
+pub use inputs::{
+    About, BusCall, BusTrace, BusTrouble, DriverWish, GivenStep, Inputs, RawFrame, SentFrame,
+};
 pub use reader::{Entry, Reader, Wanted};
-pub use recorder::{Recording, RunHeader, Torn};
+pub use recorder::{BusHeader, Recording, RunHeader, Torn};
 pub use recover::{Recovered, recover};
 pub use schedule::{Due, Schedule};
 pub use telemetry::{Combination, Geodesy, Scenery, lanes_at_start, messages, static_frames};
 pub use topic::{TOPICS, Topic, TopicMessage};
+
+#[cfg(test)]
+mod tests {
+    use dynamics::{RoadPatch, TruckModel, TruckParameters};
+
+    /// The sheet of a truck.
+    pub(crate) fn sheet() -> String {
+        let model = TruckModel::new(TruckParameters::load("reference").unwrap(), 2e4).unwrap();
+        model.vehicle_limits_in(&RoadPatch::default()).unwrap().to_sheet().unwrap()
+    }
+}

@@ -6,6 +6,7 @@ use byteorder::LittleEndian;
 
 use crate::error::RecordingError;
 use crate::ros::Message;
+use crate::ros::input::{BusTick, CanFrame, StackInput, StackLimits, StackScene};
 use crate::ros::marker::MarkerArray;
 use crate::ros::schema::schema_text;
 use crate::ros::standard::{Clock, NavSatFix, Odometry, Path, TfMessage};
@@ -70,6 +71,15 @@ impl<M: Message> TopicOf<M> {
             .map_err(|e| RecordingError::Encode { topic: self.topic.name, why: e.to_string() })?;
         Ok(TopicMessage { topic: self.topic, cdr })
     }
+
+    /// The message that bytes from a file hold; `None` if they are too few or make no sense.
+    pub(crate) fn decode(&self, cdr: &[u8]) -> Option<M>
+    where
+        M: serde::de::DeserializeOwned,
+    {
+        let body = cdr.strip_prefix(&ENCAPSULATION)?;
+        cdr_encoding::from_bytes::<M, LittleEndian>(body).ok().map(|(message, _)| message)
+    }
 }
 
 /// Frames that do not change during a run.
@@ -85,9 +95,15 @@ pub(crate) const PATH: TopicOf<Path> = TopicOf::new("/plan/path");
 pub(crate) const SCENE: TopicOf<Scene> = TopicOf::new("/scene");
 pub(crate) const MARKERS: TopicOf<MarkerArray> = TopicOf::new("/markers");
 pub(crate) const LANES: TopicOf<MarkerArray> = TopicOf::latched("/road/lanes");
+pub(crate) const LIMITS: TopicOf<StackLimits> = TopicOf::new("/stack/limits");
+pub(crate) const VEHICLES: TopicOf<StackScene> = TopicOf::new("/stack/scene");
+pub(crate) const INPUT: TopicOf<StackInput> = TopicOf::new("/stack/input");
+/// Of a drive over a bus; `BUS` stands for its name.
+pub(crate) const CAN_FRAMES: TopicOf<CanFrame> = TopicOf::new("/can/BUS/frames");
+pub(crate) const CAN_TICKS: TopicOf<BusTick> = TopicOf::new("/can/BUS/ticks");
 
 /// Every topic, in the order in which a file opens them.
-pub const TOPICS: [Topic; 11] = [
+pub const TOPICS: [Topic; 14] = [
     STATIC_FRAMES.topic,
     FIX.topic,
     CLOCK.topic,
@@ -99,6 +115,9 @@ pub const TOPICS: [Topic; 11] = [
     SCENE.topic,
     MARKERS.topic,
     LANES.topic,
+    LIMITS.topic,
+    VEHICLES.topic,
+    INPUT.topic,
 ];
 
 #[cfg(test)]

@@ -83,6 +83,7 @@ pub struct Road {
     limits: Vec<(f64, f64)>,
     objects: Vec<RoadObject>,
     geo_reference: Option<GeoReference>,
+    limit_cap_m_s: Option<f64>,
 }
 
 impl Road {
@@ -121,6 +122,7 @@ impl Road {
             limits,
             objects: Vec::new(),
             geo_reference: None,
+            limit_cap_m_s: None,
         })
     }
 
@@ -153,7 +155,14 @@ impl Road {
         for (_, limit_m_s) in road.limits.iter_mut().chain(lanes) {
             *limit_m_s = limit_m_s.min(cap_m_s.max(0.1));
         }
+        road.limit_cap_m_s = Some(cap_m_s);
         road
+    }
+
+    /// The cap of [`Self::with_limit_cap`], m/s; of several the last.
+    #[must_use]
+    pub const fn limit_cap_m_s(&self) -> Option<f64> {
+        self.limit_cap_m_s
     }
 
     /// Tunnels and bridges along the road.

@@ -34,6 +34,8 @@ pub(crate) enum Command {
     Map(cmd::map::Command),
     /// Drives the truck model with measured inputs and says how well it fits.
     Replay(cmd::replay::Args),
+    /// Drives the stack again with what it was given in a recording, and compares every command.
+    ProcessReplay(cmd::process_replay::Args),
     /// Looks at a J1939 bus, claims an address, asks, sends.
     Can(Box<cmd::can::Args>),
     /// Makes a whole recording of one torn by a crash.

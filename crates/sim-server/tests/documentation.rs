@@ -201,7 +201,8 @@ fn every_flag_that_a_page_names_exists() {
     let mut looked_up = 0;
     for command in pages().iter().flat_map(|p| commands(p)) {
         let Some(arguments) = command.arguments() else { continue };
-        let is_word = |w: &&String| w.chars().all(|c| c.is_ascii_lowercase());
+        let letter = |c: char| c.is_ascii_lowercase() || c == '-';
+        let is_word = |w: &&String| !w.starts_with('-') && w.chars().all(letter);
         let ours: Vec<&str> = arguments.iter().take_while(is_word).map(String::as_str).collect();
         let name = match ours.as_slice() {
             [a @ ("map" | "scenario" | "experiment" | "truck" | "can"), b, ..] => {

@@ -59,7 +59,7 @@ mod traffic_section;
 mod truck;
 mod world;
 
-pub use bus_loop::{BusFigures, BusLoop, End};
+pub use bus_loop::{BusFigures, BusLoop, End, bus_driver, bus_driver_setup};
 pub use collision::{Footprint, footprints_overlap};
 pub use drivability::{Drivability, Drive, Spread};
 pub use error::SimError;
@@ -76,9 +76,9 @@ pub use run_report::{EndReason, RunReport, WallClock};
 pub use scenario::{EgoStart, RunLimits, Scenario, TruckSection, Weather};
 pub use sim_truck::SimTruck;
 pub use tick_times::{TickTime, TickTimes};
-pub use traffic::{Arrivals, Traffic, read_manifest, recording_of};
+pub use traffic::{Arrivals, Traffic, read_manifest, recording_of, road_fingerprint};
 pub use traffic_section::{
     Family, OnFailure, ReplaySection, SumoSection, SumoTimeouts, TrafficKind, TrafficSection,
 };
 pub use truck::Truck;
-pub use world::{Status, World};
+pub use world::{Status, World, stack_of};

@@ -107,7 +107,7 @@ impl Traffic {
         let mut inputs = Manifest { seed, ..Manifest::default() };
         let mut input = |name: &str, value: String| inputs.inputs.insert(name.to_owned(), value);
         input("mode", word(mode));
-        input("road", fingerprint_of(road));
+        input("road", road_fingerprint(road));
         input("scenario", scenario_text(scenario)?);
         if let Some(file) = &section.detectors {
             input("detectors", file_fingerprint(file.as_ref())?);
@@ -359,7 +359,8 @@ fn file_fingerprint(file: &Path) -> Result<String, SimError> {
 }
 
 /// A fingerprint of where a road lies and what lanes it has.
-fn fingerprint_of(road: &Road) -> String {
+#[must_use]
+pub fn road_fingerprint(road: &Road) -> String {
     let samples = (road.length_m() / ROAD_SAMPLE_M) as usize;
     let mut bytes = Vec::with_capacity(64 * samples);
     let mut add = |x: f64| bytes.extend_from_slice(&x.to_bits().to_le_bytes());

@@ -8,7 +8,7 @@ use j1939::BitRate;
 use j1939::bus::Bus;
 use planner::{RatesConfig, Stack, StackConfig};
 use road::Road;
-use tractrix_core::{Geometry, Recorder, Scene, Tick, Time, Vehicle};
+use tractrix_core::{Geometry, Recorder, Scene, Tick, Time, Vehicle, VehicleLimits};
 
 use crate::ecu::Ahead;
 use crate::{
@@ -103,13 +103,8 @@ impl World {
             rates: RatesConfig::for_tick(scenario.run.tick_s),
             ..scenario.stack.clone()
         };
-        let stack = match &scenario.policy_file {
-            Some(file) => {
-                let policy = Arc::new(read_policy(file.as_ref())?);
-                Stack::with_policy(config, limits, policy)?
-            }
-            None => Stack::new(config, limits)?,
-        };
+        let policy = scenario.policy_file.as_deref().map(Path::new);
+        let stack = stack_of(config, limits, policy)?;
         let sensors = scenario.traffic.perception.enabled;
         Ok(Self { plant: plant.map_truck(Truck::Direct), stack, ghost: None, sensors })
     }
@@ -294,6 +289,21 @@ impl World {
     pub fn truck(&self) -> &SimTruck {
         self.plant.truck()
     }
+}
+
+/// A stack with this configuration; `policy` has the weights of the learned decider.
+///
+/// # Errors
+/// [`SimError`] names the key of the configuration or the file that cannot be used.
+pub fn stack_of(
+    config: StackConfig,
+    limits: &VehicleLimits,
+    policy: Option<&Path>,
+) -> Result<Stack, SimError> {
+    Ok(match policy {
+        Some(file) => Stack::with_policy(config, limits, Arc::new(read_policy(file)?))?,
+        None => Stack::new(config, limits)?,
+    })
 }
 
 /// Weights of the learned decider, with the `.json` beside them.

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use planner::StackConfig;
 use recording::{Combination, Geodesy, Recording, RunHeader, Scenery};
 use road::Road;
-use tractrix_core::{Recorder, Tick, VehicleLimits};
+use tractrix_core::{Recorder, Step, Tick, VehicleLimits};
 
 use crate::failure::Failure;
 use crate::output;
@@ -41,7 +42,8 @@ impl Log {
         overwrite: bool,
         road: &Arc<Road>,
         limits: &VehicleLimits,
-        set_up: &str,
+        stack: &StackConfig,
+        set_up: BTreeMap<String, String>,
     ) -> Result<Self, Failure> {
         let Some(folder) = folder else { return Ok(Self(None)) };
         let file = free(folder, overwrite)?;
@@ -49,13 +51,15 @@ impl Log {
         let geodesy = Geodesy::of(road).map_err(Failure::input)?;
         let scenery =
             Scenery { road: Arc::clone(road), combination: Combination::new(limits), geodesy };
-        let metadata = BTreeMap::from([
+        let mut metadata = set_up;
+        metadata.extend([
             ("schema".to_owned(), "1".to_owned()),
             ("program".to_owned(), "truck-node".to_owned()),
             ("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
             ("started_unix_s".to_owned(), format!("{:.3}", unix_s())),
         ]);
-        let header = RunHeader { metadata, scenario_toml: set_up.to_owned(), scenery };
+        let stack_toml = toml::to_string(stack).map_err(Failure::work)?;
+        let header = RunHeader { metadata, scenario_toml: None, stack_toml, scenery, bus: None };
         Ok(Self(Some(Recording::create(&file, header).map_err(Failure::input)?)))
     }
 
@@ -79,6 +83,12 @@ impl Recorder for Log {
     fn record(&mut self, tick: &Tick<'_>) {
         if let Some(recording) = &mut self.0 {
             recording.record(tick);
+        }
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        if let Some(recording) = &mut self.0 {
+            recording.step(step);
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The loop: checks, driving, the stop at the end.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -118,8 +119,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         sheet.bus.config(std::process::id() as u8),
     )
     .map_err(Failure::input)?;
-    let set_up = format!("map = {:?}\ntruck = {:?}\n", args.map, args.truck.display().to_string());
-    let log = Log::begin(args.out.as_deref(), args.overwrite, &road, &limits, &set_up)?;
+    let set_up = BTreeMap::from([
+        ("road".to_owned(), args.map.clone()),
+        ("truck".to_owned(), args.truck.display().to_string()),
+    ]);
+    let out = args.out.as_deref();
+    let log = Log::begin(out, args.overwrite, &road, &limits, stack.config(), set_up)?;
     let mut node = Node {
         args,
         clock,

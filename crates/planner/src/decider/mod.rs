@@ -27,20 +27,8 @@ use crate::error::config_in;
 use crate::safety::{EgoExtent, ahead, behind, in_lane};
 use road::{LaneEnd, LaneKind, Road};
 use serde::{Deserialize, Serialize};
+pub use tractrix_core::LaneChoice;
 use tractrix_core::{EgoState, Geometry, Neighbour, Scene};
-
-/// What a decider wishes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LaneChoice {
-    /// The lane on the left (the paper's -1).
-    Left,
-    /// This lane (0).
-    #[default]
-    Keep,
-    /// The lane on the right (1).
-    Right,
-}
 
 /// Which decider to use.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

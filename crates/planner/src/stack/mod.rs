@@ -173,6 +173,12 @@ impl Stack {
         self.wish = wish;
     }
 
+    /// The lane change that is wished from outside and was not looked at yet.
+    #[must_use]
+    pub fn wish(&self) -> LaneChoice {
+        self.wish
+    }
+
     /// One tick: the plan for `[now, next tick)`, its command guarded. Never fails: what is wrong
     /// with the inputs or the truck is in the plan's guard reasons.
     pub fn tick(

@@ -67,10 +67,19 @@ const DEFINITIONS: &[(&str, &str)] = &[
          visualization_msgs/UVCoordinate[] uv_coordinates\nstring text\nstring mesh_resource\n\
          visualization_msgs/MeshFile mesh_file\nbool mesh_use_embedded_materials\n",
     ),
+    (
+        "can_msgs/Frame",
+        "std_msgs/Header header\nuint32 id\nbool is_rtr\nbool is_extended\nbool is_error\n\
+         uint8 dlc\nuint8[8] data\n",
+    ),
     ("truck_msgs/TruckState", include_str!("../../msg/truck_msgs/TruckState.msg")),
     ("truck_msgs/PlanState", include_str!("../../msg/truck_msgs/PlanState.msg")),
     ("truck_msgs/Scene", include_str!("../../msg/truck_msgs/Scene.msg")),
     ("truck_msgs/SceneVehicle", include_str!("../../msg/truck_msgs/SceneVehicle.msg")),
+    ("truck_msgs/StackInput", include_str!("../../msg/truck_msgs/StackInput.msg")),
+    ("truck_msgs/StackScene", include_str!("../../msg/truck_msgs/StackScene.msg")),
+    ("truck_msgs/StackLimits", include_str!("../../msg/truck_msgs/StackLimits.msg")),
+    ("truck_msgs/BusTick", include_str!("../../msg/truck_msgs/BusTick.msg")),
 ];
 
 fn definition(name: &str) -> Option<&'static str> {

@@ -1,12 +1,12 @@
 //! Standard ROS 2 messages that a recording holds (common_interfaces, rcl_interfaces, geometry2).
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_big_array::BigArray;
 
 use super::Message;
 
 /// `builtin_interfaces/msg/Time` and `Duration`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub(crate) struct Stamp {
     sec: i32,
     nanosec: u32,
@@ -19,6 +19,11 @@ impl Stamp {
             sec: i32::try_from(time.0.div_euclid(1_000_000_000)).unwrap_or(i32::MAX),
             nanosec: u32::try_from(time.0.rem_euclid(1_000_000_000)).unwrap_or(0),
         }
+    }
+
+    /// The simulation time again.
+    pub(crate) fn time(self) -> tractrix_core::Time {
+        tractrix_core::Time(i64::from(self.sec) * 1_000_000_000 + i64::from(self.nanosec))
     }
 }
 

@@ -50,11 +50,7 @@ impl TruckState {
     /// From the contract types.
     pub(crate) fn new(header: Header, ego: &EgoState, grade_rad: f64, command: &Command) -> Self {
         let p = &ego.powertrain;
-        let (gear_request, requested_gear) = match command.gear {
-            GearRequest::Automatic => (0, 0),
-            GearRequest::Gear(gear) => (1, gear),
-            GearRequest::Neutral => (2, 0),
-        };
+        let (gear_request, requested_gear) = gear_codes(command.gear);
         Self {
             header,
             s_m: ego.s_m,
@@ -84,16 +80,30 @@ impl TruckState {
             fuel_used_g: p.fuel_used_g,
             accelerator_pedal_frac: command.accelerator_pedal_frac,
             xbr_decel_m_s2: command.xbr_decel_m_s2,
-            brake_mode: match command.brake_mode {
-                BrakeMode::Off => 0,
-                BrakeMode::Addition => 1,
-                BrakeMode::Maximum => 2,
-            },
+            brake_mode: brake_code(command.brake_mode),
             command_steering_wheel_rad: command.steering_wheel_rad,
             command_retarder_frac: command.retarder_frac,
             gear_request,
             requested_gear,
         }
+    }
+}
+
+/// The code of a brake mode.
+pub(crate) const fn brake_code(mode: BrakeMode) -> u8 {
+    match mode {
+        BrakeMode::Off => 0,
+        BrakeMode::Addition => 1,
+        BrakeMode::Maximum => 2,
+    }
+}
+
+/// The code of a gear request, and its gear.
+pub(crate) const fn gear_codes(request: GearRequest) -> (u8, u8) {
+    match request {
+        GearRequest::Automatic => (0, 0),
+        GearRequest::Gear(gear) => (1, gear),
+        GearRequest::Neutral => (2, 0),
     }
 }
 

@@ -7,6 +7,7 @@ pub(crate) mod ecu;
 pub(crate) mod experiment;
 pub(crate) mod map;
 pub(crate) mod plan;
+pub(crate) mod process_replay;
 pub(crate) mod recover;
 pub(crate) mod replay;
 pub(crate) mod run;
@@ -31,6 +32,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Traffic(args)) => traffic::run(&args),
         Some(Command::Map(command)) => map::run(command),
         Some(Command::Replay(args)) => replay::run(&args),
+        Some(Command::ProcessReplay(args)) => process_replay::run(&args),
         Some(Command::Can(args)) => can::run(&args),
         Some(Command::Recover(args)) => recover::run(&args),
         Some(Command::Ecu(args)) => ecu::run(&args),

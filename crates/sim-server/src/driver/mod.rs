@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use recording::Recording;
 use serde::Serialize;
 use sim::{EndReason, Status, TickTime, TickTimes, World};
-use tractrix_core::{Recorder, Tick};
+use tractrix_core::{Recorder, Step, Tick};
 
 pub(crate) use control::{Control, ControlSender, channel};
 pub(crate) use pace::Pace;
@@ -69,6 +69,10 @@ impl Recorder for Sinks<'_> {
         if let Some(publisher) = &mut self.publisher {
             publisher.record(tick);
         }
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        self.recording.step(step);
     }
 }
 

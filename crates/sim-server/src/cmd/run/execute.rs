@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use planner::decider::DeciderKind;
-use recording::{Combination, Geodesy, Recording, RunHeader, Scenery};
+use recording::{BusHeader, Combination, Geodesy, Recording, RunHeader, Scenery};
 use road::Road;
 use sim::{BusFigures, EndReason, GhostReport, RunReport, Scenario, TrafficKind, WallClock, World};
 use tokio::sync::Notify;
@@ -39,7 +39,7 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
         _ => out.path().join("sumo"),
     };
     let mut world = World::in_folder(scenario, seed, &sumo).map_err(Failure::input)?;
-    super::options::connect(&mut world, &args.vehicle)?;
+    let bus = super::options::connect(&mut world, &args.vehicle)?;
     warn_of_road(world.road());
     let (provenance, started) = (Provenance::of_seed(seed), unix_time());
     let combination = Combination::new(world.truck().limits());
@@ -56,7 +56,7 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     let stop = Arc::new(AtomicBool::new(false));
     let pace = args.pace.unwrap_or(if args.headless { Pace::Max } else { Pace::REALTIME });
     let job = Job {
-        recording: start_recording(&out, started, seed, scenario, &world, combination)?,
+        recording: start_recording(&out, started, seed, &world, combination, bus)?,
         progress: Progress::of_run(&world),
         world,
         pace,
@@ -146,26 +146,30 @@ fn start_recording(
     out: &OutFolder,
     started: Duration,
     seed: u64,
-    scenario: &Scenario,
     world: &World,
     combination: Combination,
+    bus: Option<BusHeader>,
 ) -> Result<Recording, Failure> {
+    let scenario = world.scenario();
     let metadata = BTreeMap::from([
         ("schema".to_owned(), "1".to_owned()),
         ("seed".to_owned(), seed.to_string()),
         ("version".to_owned(), VERSION.to_owned()),
         ("git_revision".to_owned(), GIT_REVISION.to_owned()),
         ("scenario".to_owned(), scenario.name.clone()),
+        ("road".to_owned(), scenario.road.clone()),
+        ("road_fingerprint".to_owned(), sim::road_fingerprint(world.road())),
         ("started_unix_s".to_owned(), format!("{:.3}", started.as_secs_f64())),
     ]);
-    let scenario_toml = toml::to_string(scenario).map_err(Failure::work)?;
+    let scenario_toml = Some(toml::to_string(scenario).map_err(Failure::work)?);
+    let stack_toml = toml::to_string(world.stack().config()).map_err(Failure::work)?;
     let road = Arc::clone(world.road());
     let geodesy = Geodesy::of(&road).unwrap_or_else(|why| {
         output::note(&format!("{}: {why}: no /fix in the recording", road.name()));
         None
     });
     let scenery = Scenery { road, combination, geodesy };
-    let header = RunHeader { metadata, scenario_toml, scenery };
+    let header = RunHeader { metadata, scenario_toml, stack_toml, scenery, bus };
     Ok(Recording::create(&out.begin("run.mcap")?, header)?)
 }
 

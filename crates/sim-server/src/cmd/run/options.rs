@@ -1,9 +1,15 @@
 //! From options to the scenario that is driven.
 
+use std::collections::BTreeMap;
+
 use j1939::BitRate;
+use j1939::bus::Bus;
+use j1939::bus::loopback::Loopback;
+use recording::{BusHeader, BusTrace, DriverWish};
 use sim::{Overrides, Scenario, World};
 
 use super::Args;
+use crate::bus_record;
 use crate::failure::Failure;
 
 /// The scenario with the command line's changes.
@@ -41,20 +47,33 @@ fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
 }
 
 /// Reaches the truck as `--vehicle` says: directly, over a bus in memory, or over a bus outside
-/// (both ends in this process, time from the ticks).
+/// (both ends in this process, time from the ticks). Says what the recording needs of the bus.
 ///
 /// # Errors
 /// [`Failure::Input`] names a bus that does not exist or cannot be opened.
-pub(super) fn connect(world: &mut World, vehicle: &str) -> Result<(), Failure> {
+pub(super) fn connect(world: &mut World, vehicle: &str) -> Result<Option<BusHeader>, Failure> {
     let rate = BitRate::Kbit250;
-    match vehicle {
-        "direct" => Ok(()),
-        "bus" => world.put_on_loopback(rate).map_err(Failure::work),
+    let [ecu, driver]: [Box<dyn Bus + Send + Sync>; 2] = match vehicle {
+        "direct" => return Ok(None),
+        "bus" => {
+            let wire = Loopback::new(rate, 2);
+            [Box::new(wire.node(0)), Box::new(wire.node(1))]
+        }
         name => {
             let open =
                 || j1939::bus::open(name).map_err(|e| Failure::Input(format!("--vehicle {e}")));
-            let [ecu, driver] = sim::in_step(open()?, open()?);
-            world.put_on_bus(rate, ecu, driver).map_err(Failure::work)
+            sim::in_step(open()?, open()?)
         }
-    }
+    };
+    let trace = BusTrace::default();
+    world.put_on_bus(rate, ecu, bus_record::tapped(driver, &trace)).map_err(Failure::work)?;
+    // The truck's driver was asked to drive at the end of the warm-up
+    trace.wished(DriverWish::Engage);
+    let name = vehicle.rsplit([':', '/']).next().unwrap_or(vehicle).to_owned();
+    let metadata = BTreeMap::from([
+        ("vehicle".to_owned(), vehicle.to_owned()),
+        (bus_record::RATE_KEY.to_owned(), bus_record::rate_kbit_s(rate).to_string()),
+        (bus_record::SETUP_KEY.to_owned(), sim::bus_driver_setup()),
+    ]);
+    Ok(Some(BusHeader { name, metadata, trace }))
 }

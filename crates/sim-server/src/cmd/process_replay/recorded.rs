@@ -1,0 +1,131 @@
+//! What was recorded in the places from which the stack and the truck's driver were given it.
+
+use j1939::Frame;
+use j1939::bus::{Bus, BusError};
+use recording::{BusCall, GivenStep, RawFrame};
+use tractrix_core::{
+    Command, EgoState, Pose, PoseSource, Scene, Stamped, Time, TrafficSource, Vehicle,
+    VehicleLimits, VehicleStatus,
+};
+
+use crate::bus_record;
+
+/// It failed in the run as well.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("as recorded")]
+pub(super) struct AsRecorded;
+
+/// The truck as the stack saw it in a step.
+pub(super) struct RecordedVehicle<'a> {
+    pub(super) step: &'a GivenStep,
+    pub(super) limits: &'a VehicleLimits,
+}
+
+impl Vehicle for RecordedVehicle<'_> {
+    type Error = AsRecorded;
+
+    fn ego(&mut self, _now: Time) -> Result<Stamped<EgoState>, AsRecorded> {
+        self.step.ego.ok_or(AsRecorded)
+    }
+
+    fn command(&mut self, _now: Time, _command: &Command) -> Result<(), AsRecorded> {
+        Ok(())
+    }
+
+    fn limits(&self) -> &VehicleLimits {
+        self.limits
+    }
+
+    fn status(&self) -> VehicleStatus {
+        self.step.status
+    }
+}
+
+/// The other vehicles of a step.
+pub(super) struct RecordedTraffic<'a>(pub(super) &'a GivenStep);
+
+impl TrafficSource for RecordedTraffic<'_> {
+    type Error = AsRecorded;
+
+    fn advance(&mut self, _now: Time, _ego: &EgoState) -> Result<&Scene, AsRecorded> {
+        self.0.scene.as_ref().ok_or(AsRecorded)
+    }
+}
+
+/// The pose of a step. The ego state has it as it came from its source.
+#[derive(Debug, Default)]
+pub(super) struct RecordedPose(pub(super) Option<Stamped<Pose>>);
+
+impl RecordedPose {
+    pub(super) fn of(step: &GivenStep) -> Self {
+        Self(step.ego.map(|Stamped { time, value: e }| Stamped {
+            time,
+            value: Pose {
+                x_m: e.x_m,
+                y_m: e.y_m,
+                z_m: e.z_m,
+                yaw_rad: e.yaw_rad,
+                s_m: e.s_m,
+                d_m: e.d_m,
+                lateral_speed_m_s: e.lateral_speed_m_s,
+                articulation_rad: e.trailer.articulation_rad,
+                trailer_yaw_rate_rad_s: e.trailer.yaw_rate_rad_s,
+            },
+        }))
+    }
+}
+
+impl PoseSource for RecordedPose {
+    type Error = AsRecorded;
+
+    fn pose(&mut self, _now: Time) -> Result<Stamped<Pose>, AsRecorded> {
+        self.0.ok_or(AsRecorded)
+    }
+}
+
+/// A bus on which happens what happened in a reading.
+#[derive(Debug, Default)]
+pub(super) struct RecordedBus {
+    call: BusCall,
+    received: usize,
+    sent: usize,
+    /// The first frame that is sent now and was not then.
+    pub(super) unheard_of: Option<RawFrame>,
+}
+
+impl RecordedBus {
+    /// Goes on with another reading.
+    pub(super) fn begin(&mut self, call: BusCall) {
+        *self = Self { call, ..Self::default() };
+    }
+}
+
+impl Bus for RecordedBus {
+    fn send(&mut self, _now: Time, frame: &Frame) -> Result<(), BusError> {
+        let frame = bus_record::raw(frame);
+        let rest = self.call.sent.iter().enumerate().skip(self.sent);
+        // A frame that failed has lost its identifier to the class of its failure
+        let alike = |sent: &recording::SentFrame| match sent.trouble {
+            None => sent.frame == frame,
+            Some(_) => sent.frame.data == frame.data && sent.frame.len == frame.len,
+        };
+        let Some((index, sent)) = rest.into_iter().find(|(_, sent)| alike(sent)) else {
+            self.unheard_of.get_or_insert(frame);
+            return Ok(());
+        };
+        self.sent = index + 1;
+        sent.trouble.map_or(Ok(()), |trouble| Err(bus_record::failure(trouble)))
+    }
+
+    fn receive(&mut self, _now: Time) -> Result<Option<Stamped<Frame>>, BusError> {
+        let heard = self.call.received.get(self.received);
+        self.received += 1;
+        match heard {
+            None => Ok(None),
+            Some(Err(trouble)) => Err(bus_record::failure(*trouble)),
+            Some(Ok(Stamped { time, value })) => {
+                Ok(Some(Stamped { time: *time, value: bus_record::frame(value) }))
+            }
+        }
+    }
+}

@@ -1,0 +1,134 @@
+//! The stack of a recording, built again of what the file says about it.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use j1939::BitRate;
+use planner::{Stack, StackConfig};
+use recording::About;
+use road::Road;
+use sim::Scenario;
+use toml::{Table, Value};
+use tractrix_core::VehicleLimits;
+
+use super::Args;
+use crate::bus_record::{self, RATE_KEY, SETUP_KEY};
+use crate::failure::Failure;
+use crate::output;
+use crate::provenance::GIT_REVISION;
+
+/// What the stack is built of, and where it drives.
+pub(super) struct Setup {
+    config: StackConfig,
+    policy_file: Option<String>,
+    road: Arc<Road>,
+    /// The road with the limit that holds now beside its own ones, and that limit, m/s.
+    limited: Option<(f64, Arc<Road>)>,
+}
+
+impl Setup {
+    /// From what a recording says, with the changes of the command line.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] names what the file lacks, or the key or road that cannot be used.
+    pub(super) fn new(args: &Args, about: &About) -> Result<Self, Failure> {
+        let file = &args.file;
+        let lacks = |what: &str| Failure::file(file, format!("it has no {what}"));
+        let attached = about.text("stack.toml").ok_or_else(|| lacks("stack.toml"))?;
+        let mut table: Table =
+            attached.parse().map_err(|e| Failure::file(file, format!("stack.toml: {e}")))?;
+        for change in &args.set {
+            set(&mut table, change)?;
+        }
+        let config = Value::Table(table).try_into::<StackConfig>();
+        let config = config.map_err(|e| match args.set.is_empty() {
+            true => Failure::file(file, format!("stack.toml: {e}")),
+            false => Failure::Input(format!("--set {}: {e}", args.set.join(" --set "))),
+        })?;
+        let scenario = match about.text("scenario.toml") {
+            Some(text) => Some(
+                Scenario::from_toml_str(&file.display().to_string(), text)
+                    .map_err(Failure::input)?,
+            ),
+            None => None,
+        };
+        let road = match (&args.road, &scenario, about.value("run", "road")) {
+            (Some(name), ..) => Road::load(name).map_err(Failure::input)?,
+            (None, Some(scenario), _) => scenario.load_road().map_err(Failure::input)?,
+            (None, None, Some(name)) => Road::load(name).map_err(Failure::input)?,
+            (None, None, None) => return Err(lacks("road in its record `run`")),
+        };
+        let found = sim::road_fingerprint(&road);
+        match about.value("run", "road_fingerprint") {
+            None => output::note("the recording cannot tell whether the road is still the same"),
+            Some(driven) if driven == found => {}
+            Some(driven) => {
+                let name = road.name();
+                let why =
+                    format!("road {name} is not the one that was driven ({found}, not {driven})");
+                return Err(Failure::file(file, why));
+            }
+        }
+        let revision = about.value("run", "git_revision").unwrap_or("unknown");
+        if revision != GIT_REVISION {
+            output::note(&format!("recorded by revision {revision}, this is {GIT_REVISION}"));
+        }
+        let policy_file = scenario.and_then(|scenario| scenario.policy_file);
+        Ok(Self { config, policy_file, road: Arc::new(road), limited: None })
+    }
+
+    /// The stack for a truck.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] names the key or file that cannot be used.
+    pub(super) fn stack(&self, limits: &VehicleLimits) -> Result<Stack, Failure> {
+        let policy = self.policy_file.as_deref().map(Path::new);
+        sim::stack_of(self.config.clone(), limits, policy).map_err(Failure::input)
+    }
+
+    /// The road with a limit beside its own ones, m/s.
+    pub(super) fn road(&mut self, cap_m_s: Option<f64>) -> Arc<Road> {
+        if cap_m_s != self.limited.as_ref().map(|(cap_m_s, _)| *cap_m_s) {
+            self.limited = cap_m_s.map(|cap| (cap, Arc::new(self.road.with_limit_cap(cap))));
+        }
+        Arc::clone(self.limited.as_ref().map_or(&self.road, |(_, road)| road))
+    }
+}
+
+/// The bit rate of the bus in a recording, whose driver must be set up as ours is.
+///
+/// # Errors
+/// [`Failure::Input`] if it was not driven over a bus, or otherwise.
+pub(super) fn bus_rate(file: &Path, about: &About) -> Result<BitRate, Failure> {
+    let rate = about.value("bus", RATE_KEY).and_then(bus_record::bit_rate);
+    let Some(rate) = rate else {
+        let why = "it has no frames of a bus (run --vehicle bus); use --from ego";
+        return Err(Failure::file(file, why));
+    };
+    let (was, is) = (about.value("bus", SETUP_KEY).unwrap_or("unknown"), sim::bus_driver_setup());
+    if was != is {
+        let why = format!("what drove the truck over its bus was set up as {was}, now it is {is}");
+        return Err(Failure::file(file, why));
+    }
+    Ok(rate)
+}
+
+/// Puts `KEY=VALUE` into a configuration, where the key is there already.
+fn set(table: &mut Table, change: &str) -> Result<(), Failure> {
+    let wrong = |why: &str| Failure::Input(format!("--set {change}: {why}"));
+    let (key, text) = change.split_once('=').ok_or_else(|| wrong("expected KEY=VALUE"))?;
+    let (path, last) = key.rsplit_once('.').unwrap_or(("", key));
+    let mut at = table;
+    for part in path.split('.').filter(|part| !part.is_empty()) {
+        at = at
+            .get_mut(part)
+            .and_then(Value::as_table_mut)
+            .ok_or_else(|| wrong(&format!("there is no table {part}")))?;
+    }
+    let known = at.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+    let old = at.get_mut(last).ok_or_else(|| wrong(&format!("there are {known}")))?;
+    let parsed = format!("value = {text}").parse::<Table>().ok();
+    let value = parsed.and_then(|mut t| t.remove("value"));
+    *old = value.unwrap_or_else(|| Value::String(text.to_owned()));
+    Ok(())
+}
