@@ -150,6 +150,61 @@ fn what_is_read_is_what_was_measured_within_half_a_step() {
     }
 }
 
+/// Steps of 5 kPa; each wheel is off by half of one at most, and so is the mean.
+#[test]
+fn brake_pressure_is_read_within_half_a_step() {
+    for i in 0..80 {
+        let mut yard = Yard::new();
+        let wheels = [0.0, 1.3, 2.1, 3.7].map(|off| 1e3 * (off + 9.7 * f64::from(i)));
+        yard.controllers.measured.brake_pressure_pa = wheels;
+        yard.run(0.3);
+        let (read, mean) =
+            (yard.ego.powertrain.brake_pressure_pa, wheels.iter().sum::<f64>() / 4.0);
+        assert!((read - mean).abs() <= 2500.0 + 1e-6, "{read} Pa, {mean} Pa");
+    }
+}
+
+/// The bus has no brake force: it is the demand, which XBR rounds to 1/2048 m/s², times the mass.
+#[test]
+fn brake_force_is_that_of_the_demand_within_half_a_step() {
+    let mass_kg = limits().road_load.mass_kg;
+    let mut yard = Yard::engaged();
+    for i in 1..60 {
+        let decel_m_s2 = 0.0417 * f64::from(i);
+        yard.command.xbr_decel_m_s2 = decel_m_s2;
+        yard.command.brake_mode = BrakeMode::Maximum;
+        yard.controllers.measured.brakes_act = i % 4 != 0;
+        let frames = yard.run(0.2);
+        let xbr = of(&frames, Xbr::TABLE.pgn, 0x0B).last().unwrap();
+        let (asked_m_s2, _) = brakes_asked(&Xbr::decode(xbr.id(), xbr.bytes()).unwrap());
+        let told_n = yard.ego.powertrain.brake_force_n;
+        let acting_n = if i % 4 == 0 { 0.0 } else { mass_kg * asked_m_s2 };
+        assert!((told_n - acting_n).abs() <= mass_kg * 0.5 / 2048.0 + 1e-6, "{told_n} {acting_n}");
+    }
+}
+
+/// A wheel speed that is off by half a step puts the filtered derivative off by a step over the
+/// filter's time and a period at most; the times of frames waver by the bus (1 ms of 20).
+#[test]
+fn acceleration_errs_by_a_sixth_of_a_step_a_period() {
+    const STEP_M_S: f64 = 1.0 / 256.0 / 3.6;
+    let filter_s = BusTruckConfig::default().acceleration_filter_s;
+    let mut worst_m_s2 = 0.0_f64;
+    for accel_m_s2 in [-2.5, -1.1, -0.3, 0.0, 0.07, 0.4, 1.3] {
+        let mut yard = Yard::new();
+        for tick in 0..400 {
+            yard.tick();
+            yard.controllers.measured.speed_m_s += 0.01 * accel_m_s2;
+            if tick > 200 {
+                let off_m_s2 = (yard.ego.accel_x_m_s2 - accel_m_s2).abs();
+                let wavers_m_s2 = 0.05 * accel_m_s2.abs();
+                worst_m_s2 = worst_m_s2.max(off_m_s2 - wavers_m_s2);
+            }
+        }
+    }
+    assert!(worst_m_s2 <= STEP_M_S / (filter_s + 0.02), "{worst_m_s2}");
+}
+
 #[test]
 fn acceleration_is_made_of_wheel_speeds_and_fuel_is_the_integral_of_its_rate() {
     let mut yard = Yard::new();

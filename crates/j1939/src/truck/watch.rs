@@ -15,10 +15,10 @@ pub(super) type BusSupervisor = Supervisor<6, 6>;
 pub(super) fn supervisor(rate: BitRate, config: &BusTruckConfig) -> BusSupervisor {
     let watches = [
         watch::<Eec1>(config.engine, SafetySignal::Engine),
-        watch::<Eec2>(config.engine, SafetySignal::Pedals),
+        often(watch::<Eec2>(config.engine, SafetySignal::Pedals), 20),
         watch::<Etc2>(config.transmission, SafetySignal::Transmission),
         watch::<Ebc1>(config.brakes, SafetySignal::Brakes),
-        watch::<Hrw>(config.brakes, SafetySignal::RoadSpeed),
+        often(watch::<Hrw>(config.brakes, SafetySignal::RoadSpeed), 10),
         watch::<Vdc2>(config.brakes, SafetySignal::YawRate),
     ];
     // Transmissions ask the engine for torque in a shift, brakes ask retarders not to lock wheels
@@ -26,6 +26,8 @@ pub(super) fn supervisor(rate: BitRate, config: &BusTruckConfig) -> BusSuperviso
     let slows =
         AddressSet::of(&[config.address, config.transmission, config.brakes, config.engine]);
     let ours = AddressSet::of(&[config.address]);
+    // Addresses 5 and 6 are shift consoles (SAE J1939 appendix B); a T270 of 2014 has one
+    let selects = AddressSet::of(&[config.address, 0x05, 0x06]);
     let torque = |da, senders| Exclusive { pgn: Tsc1::TABLE.pgn, da, senders };
     let [first, second, third] = config.retarders.map(|da| {
         // An address that no retarder has is the engine's: the same rule twice
@@ -37,7 +39,7 @@ pub(super) fn supervisor(rate: BitRate, config: &BusTruckConfig) -> BusSuperviso
         second,
         third,
         Exclusive { pgn: config.xbr.pgn, da: config.brakes, senders: ours },
-        Exclusive { pgn: Tc1::TABLE.pgn, da: config.transmission, senders: ours },
+        Exclusive { pgn: Tc1::TABLE.pgn, da: config.transmission, senders: selects },
     ];
     Supervisor::new(BusBounds::usual(rate), watches, exclusives)
 }
@@ -50,4 +52,10 @@ fn watch<M: Message>(sa: u8, signal: SafetySignal) -> Watch {
         timeout_nanos: (lost_after_s(signal) * 1e9) as i64,
         protection: None,
     }
+}
+
+/// A message that some trucks send more often than the standard has it: a T270 of 2014 EEC2 every
+/// 20 ms (50), a truck of 2024 HRW every 10 ms (20).
+const fn often(watch: Watch, shortest_ms: i64) -> Watch {
+    Watch { period_nanos: shortest_ms * 1_000_000, ..watch }
 }

@@ -5,7 +5,9 @@ use core::convert::Infallible;
 
 use j1939::bus::Bus;
 use j1939::bus::loopback::{Loopback, LoopbackNode};
-use j1939::message::{Ebc1, Ebc5, Ec1, Eec1, Eec2, Eec3, Erc1, Etc1, Etc2, Hrw, Lfe1, Rc, Vdc2};
+use j1939::message::{
+    Ebc1, Ebc3, Ebc5, Ec1, Eec1, Eec2, Eec3, Erc1, Etc1, Etc2, Hrw, Lfe1, Rc, Vdc2,
+};
 use j1939::steering::ExampleSteering;
 use j1939::truck::{BusTruck, BusTruckConfig, Engagement, Torque};
 use j1939::{BitRate, Frame, GLOBAL_ADDRESS, Message, Slot, Transport};
@@ -47,6 +49,8 @@ pub struct Measured {
     pub gear: i16,
     pub retarder_frac: f64,
     pub xbr_state: u8,
+    pub brakes_act: bool,
+    pub brake_pressure_pa: [f64; 4],
     pub driveline_engaged: u8,
 }
 
@@ -67,6 +71,8 @@ impl Default for Measured {
             gear: 12,
             retarder_frac: 0.0,
             xbr_state: 0,
+            brakes_act: false,
+            brake_pressure_pa: [0.0; 4],
             driveline_engaged: 1,
         }
     }
@@ -190,10 +196,19 @@ impl Controllers {
         self.put(now, &pedal, 0x0B);
         let brakes = Ebc5 {
             xbr_state: Slot::Value(m.xbr_state),
-            foundation_brake_use: Slot::Value(0),
+            foundation_brake_use: Slot::Value(u8::from(m.brakes_act)),
             ..Ebc5::default()
         };
         self.put(now, &brakes, 0x0B);
+        let [front_left, front_right, rear_left, rear_right] = m.brake_pressure_pa;
+        let pressures = Ebc3 {
+            front_left_pressure_pa: Slot::Value(front_left),
+            front_right_pressure_pa: Slot::Value(front_right),
+            rear_1_left_pressure_pa: Slot::Value(rear_left),
+            rear_1_right_pressure_pa: Slot::Value(rear_right),
+            ..Ebc3::default()
+        };
+        self.put(now, &pressures, 0x0B);
         let retarder = Erc1 {
             torque_mode: Slot::Value(0),
             torque_frac: Torque::of_frac(-m.retarder_frac).coarse_frac,
