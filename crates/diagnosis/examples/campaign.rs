@@ -47,6 +47,8 @@ struct Table {
     worse: usize,
     seconds: Vec<f64>,
     kept: Vec<f64>,
+    /// Stated probability of every named cause, and whether it was hidden.
+    stated: Vec<(f64, bool)>,
 }
 
 /// Causes that the speed shows when torque, pressure and gear are as measured.
@@ -145,7 +147,7 @@ fn line(d: &Diagnosis) -> String {
                 .collect();
             let or: Vec<&str> = c.confused_with.iter().map(|x| x.id).collect();
             let or = if or.is_empty() { String::new() } else { format!(" or {or:?}") };
-            format!("{}[{}] {:.0} nats{or}", c.id, p.join(" "), c.evidence)
+            format!("{}[{}] {:.0} nats p={:.2}{or}", c.id, p.join(" "), c.evidence, c.probability)
         })
         .collect();
     let unknown = d.unknown.as_ref().map_or(String::new(), |u| {
@@ -230,6 +232,8 @@ impl Table {
                 u.signals.first().is_some_and(|s| o.3.contains(s)) && d.verdict == Verdict::Unknown;
             self.signal += usize::from(right);
         }
+        let stated = d.causes.iter().map(|c| (c.probability, truth.contains(&c.id)));
+        self.stated.extend(stated.filter(|_| !deleted));
         let mut off = String::new();
         for e in hidden {
             if let Effect::Cause { id, size, .. } = e
@@ -245,7 +249,7 @@ impl Table {
         }
         if let Some(g) = &d.gain {
             self.gains += 1;
-            self.worse += usize::from(g.is_loss());
+            self.worse += usize::from(!g.significant);
             let (b, a) = (g.speed_rmse_m_s.before, g.speed_rmse_m_s.after);
             let acts = truth.iter().any(|id| ON_SPEED.contains(id));
             if let Some(o) = oracle.filter(|o| acts && b > 1.5 * o && hit > 0 && !deleted) {
@@ -286,11 +290,24 @@ impl Table {
         println!("not stated as sure  {}", of(self.unsure));
         println!("confident and wrong {}", of(self.wrong));
         println!("90 % intervals that cover {} of {}", self.covered, self.intervals);
-        println!("extension withheld, worse on held-out drives {} of {}", self.worse, self.gains);
+        println!(
+            "extension withheld, not significant on held-out drives {} of {}",
+            self.worse, self.gains
+        );
         if let (Some(m), Some(w)) =
             (self.kept.get(self.kept.len() / 2), self.kept.get(self.kept.len() / 10))
         {
             println!("speed gain over that of the true model: median {m:.3}, worst tenth {w:.3}");
+        }
+        if !self.stated.is_empty() {
+            let count = self.stated.len() as f64;
+            let of = |f: fn(&(f64, bool)) -> f64| self.stated.iter().map(f).sum::<f64>() / count;
+            println!(
+                "named causes {count}: mean probability {:.3}, hidden {:.3}, Brier score {:.4}",
+                of(|s| s.0),
+                of(|s| f64::from(u8::from(s.1))),
+                of(|s| (s.0 - f64::from(u8::from(s.1))).powi(2)),
+            );
         }
         if let Some(s) = self.seconds.get(self.seconds.len() / 2) {
             println!("time per case: median {s:.1} s");

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
+use crate::detectable::detectable;
 use crate::gain::{DriveError, HORIZON_S, drive_error, rms};
+use crate::held_out::gains;
 use crate::hypothesis::CATALOGUE;
 use crate::problem::{Problem, Reference};
 use crate::refit::Fit;
@@ -11,9 +13,10 @@ use crate::report_models::Models;
 use crate::search::MIN_EVIDENCE;
 use crate::sentence;
 use crate::sure::{Sure, beyond, judge};
+use crate::weights::{Weighed, probability, weights};
 use crate::{
-    Action, BeforeAfter, Cause, Confusion, Diagnosis, DiagnosisError, Drive, DriveSet, Executor,
-    Finding, FindingKind, Gain, NotObservable, Parameter, Plant, Verdict, Wrong,
+    Action, BeforeAfter, Cause, Confusion, Detectable, Diagnosis, DiagnosisError, Drive, DriveSet,
+    Executor, Finding, FindingKind, Gain, NotObservable, Parameter, Plant, Verdict, Wrong,
 };
 
 /// Choices of the caller.
@@ -52,8 +55,13 @@ pub enum Progress {
     Report,
 }
 
-/// Part of the evidence of a named cause within which another counts as equally good, nats.
-const AMBIGUOUS_NATS: f64 = 3.0;
+/// Evidence within which another cause says as much as the named one, nats: a lone faint cause with
+/// such a rival is not stated.
+const RIVAL_NATS: f64 = 3.0;
+/// Evidence within which another cause is listed, nats.
+const LISTED_NATS: f64 = 5.0;
+/// Probability above which a cause is stated as the explanation.
+const EXPLAINED: f64 = 0.95;
 /// Timing, noise and tolerances of a truck and its logger, learned from drives that are in order.
 #[derive(Debug, Clone)]
 pub struct Baseline {
@@ -139,19 +147,32 @@ pub fn diagnose_with(
         }
         None => (Problem::learn(plant, prepare(&learn), false, executor)?, &[] as &[DriveError]),
     };
-    let (open, not_observable) = observable(&problem, options);
+    let (open, not_observable, detectable) = observable(&problem, options);
     let bare = beyond(&problem, &problem.reference.theta);
     let most = bare.first().map_or(0.0, |s| s.log_z);
-    let fitted = problem.search(&open, options.max_causes, most, &mut |found| {
+    let fitted = problem.evidence().search(&open, options.max_causes, most, &mut |found| {
         progress(Progress::Search { found });
     });
     let Some((empty, fit)) = fitted else {
         return Err(DiagnosisError::Numerics("no evidence can be computed".into()));
     };
-    let fit = problem.gate(fit, &empty);
+    let fit = problem.evidence().gate(fit, &empty);
     progress(Progress::Unknown);
-    let (fit, shape, sure) = judge(&problem, &empty, fit, &bare);
-    let mut causes = causes(&problem, &fit, &empty, &open);
+    let (fit, shape, mut sure) = judge(&problem, &empty, fit, &bare);
+    let held = (!held.is_empty())
+        .then(|| Problem::with(plant, prepare(&held), problem.reference.clone(), executor))
+        .transpose()?;
+    let fit = match &held {
+        Some(held) => {
+            let revised = problem.evidence().revise(held, fit, &empty);
+            if revised.opposed && sure == Sure::Yes {
+                sure = Sure::Not;
+            }
+            revised.fit
+        }
+        None => fit,
+    };
+    let mut causes = causes(&problem, &fit, &empty, &open, most);
     let weak = |c: &(Cause, bool)| c.1 && c.0.evidence < MIN_EVIDENCE;
     let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);
     let fit = if faint { empty } else { fit };
@@ -163,7 +184,7 @@ pub fn diagnose_with(
         Verdict::Unknown
     } else if fit.set.is_empty() {
         Verdict::NothingToExplain
-    } else if sure == Sure::Not || causes.iter().any(|c| c.1) {
+    } else if sure == Sure::Not || causes.iter().any(|c| c.0.probability < EXPLAINED) {
         Verdict::Ambiguous
     } else {
         Verdict::Explained
@@ -174,10 +195,7 @@ pub fn diagnose_with(
         sigma: Module::ALL.map(|m| problem.reference.whiteners[m as usize].sigma),
     };
     progress(Progress::Gain);
-    let held = prepare(&held);
-    let gain = (!held.is_empty() && !fit.set.is_empty())
-        .then(|| gain(plant, &problem.reference, held, &fit, executor))
-        .transpose()?;
+    let gain = held.filter(|_| !fit.set.is_empty()).map(|held| gain(plant, &held, &fit));
     let wrong = wrong(&problem, floor);
     let mut findings = drives.findings.clone();
     if drives.truck != plant.name {
@@ -199,6 +217,7 @@ pub fn diagnose_with(
         causes: causes.into_iter().map(|c| c.0).collect(),
         unknown: shape,
         not_observable,
+        detectable,
         gain,
         extended_truck,
         tolerances_from_baseline: baseline.is_some(),
@@ -230,9 +249,13 @@ pub(crate) fn split(
     Ok((learn, held))
 }
 
-fn observable(problem: &Problem<'_>, options: &Options) -> (Vec<usize>, Vec<NotObservable>) {
+/// Hypotheses that the drives can show, those that they cannot, and what they would have shown.
+fn observable(
+    problem: &Problem<'_>,
+    options: &Options,
+) -> (Vec<usize>, Vec<NotObservable>, Vec<Detectable>) {
     let (mut open, mut not) = (Vec::new(), Vec::<NotObservable>::new());
-    let information = problem.information();
+    let information = problem.evidence().information();
     for (i, h) in CATALOGUE.iter().enumerate() {
         if options.excluded.iter().any(|x| x == h.id) {
             continue;
@@ -257,37 +280,66 @@ fn observable(problem: &Problem<'_>, options: &Options) -> (Vec<usize>, Vec<NotO
     }
     not.retain(|n| !open.iter().any(|i| CATALOGUE[*i].id == n.id));
     not.dedup_by(|a, b| a.id == b.id);
-    (open, not)
+    let detectable = detectable(&open, &information);
+    (open, not, detectable)
 }
 
-fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<(Cause, bool)> {
-    let zero = &problem.reference.theta;
-    let variances = problem.variances(fit);
+/// The causes of a fit with sizes, rivals and probabilities, and whether a rival says as much. `bare`
+/// is the evidence of the best free function without causes.
+fn causes(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    empty: &Fit,
+    open: &[usize],
+    bare: f64,
+) -> Vec<(Cause, bool)> {
+    let (evidence, zero) = (problem.evidence(), &problem.reference.theta);
+    let variances = evidence.variances(fit);
+    let ids = |set: &[usize]| set.iter().map(|h| CATALOGUE[*h].id).collect::<Vec<_>>();
+    let model = |causes, log_z| Weighed { causes, function: false, log_z };
+    let mut models = vec![model(ids(&fit.set), fit.log_z), model(Vec::new(), 0.0)];
+    models.push(Weighed { function: true, ..model(Vec::new(), bare) });
     let mut out = Vec::new();
     for (i, h) in fit.set.iter().enumerate() {
         let hyp = &CATALOGUE[*h];
-        let (fewer, theta) = problem.without(fit, i);
+        let (fewer, theta) = evidence.without(fit, i);
         let without = if fewer.is_empty() {
             Some(empty.clone())
         } else {
-            problem.fit(&fewer, &theta, empty.norm)
+            evidence.fit(&fewer, &theta, empty.norm)
         };
-        let evidence = fit.log_z - without.as_ref().map_or(0.0, |f| f.log_z);
-        let mut confused_with = Vec::new();
-        let mut ambiguous = false;
+        let lost_nats = fit.log_z - without.as_ref().map_or(0.0, |f| f.log_z);
+        let mut confused_with: Vec<Confusion> = Vec::new();
+        let mut rivalled = false;
         if let Some(f) = &without {
+            let needed = evidence.threshold(f, fit).max(MIN_EVIDENCE);
+            let counts = lost_nats * MIN_EVIDENCE / needed;
+            models.push(model(ids(&fewer), fit.log_z - counts));
             let rest: Vec<usize> = open
                 .iter()
                 .copied()
                 .filter(|o| fit.set.iter().all(|s| CATALOGUE[*s].id != CATALOGUE[*o].id))
                 .collect();
-            for c in problem.screen(f, &rest).singles(None) {
-                let id = CATALOGUE[c.hypothesis].id;
-                let lost = evidence - c.gain;
-                if lost < 5.0 && confused_with.iter().all(|x: &Confusion| x.id != id) {
-                    ambiguous |= lost < AMBIGUOUS_NATS;
-                    confused_with
-                        .push(Confusion { id, why: sentence::confusion(hyp.id, id, lost) });
+            let mut refitted: Vec<usize> = Vec::new();
+            for c in evidence.screen(f, &rest).singles(None) {
+                let rival = &CATALOGUE[c.hypothesis];
+                let (id, mut lost) = (rival.id, lost_nats - c.gain);
+                if lost < LISTED_NATS && rival.nonlinear() {
+                    // What is not linear promises more than it keeps.
+                    if refitted.contains(&c.hypothesis) {
+                        continue;
+                    }
+                    refitted.push(c.hypothesis);
+                    let instead = evidence.with_added(f, &c, empty.norm);
+                    lost = instead.map_or(lost, |r| fit.log_z - r.log_z);
+                }
+                let mut instead = ids(&fewer);
+                instead.push(id);
+                models.push(model(instead, fit.log_z - lost.max(0.0)));
+                if lost < LISTED_NATS && confused_with.iter().all(|x| x.id != id) {
+                    rivalled |= lost < RIVAL_NATS;
+                    let why = sentence::confusion(hyp.id, id, lost);
+                    confused_with.push(Confusion { id, why, probability: 0.0 });
                 }
             }
         }
@@ -304,28 +356,35 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
             }
         }
         let sentence = sentence::cause(hyp.id, hyp.size(&fit.theta, zero));
-        out.push((
-            Cause { id: hyp.id, kind: hyp.kind, sentence, parameters, evidence, confused_with },
-            ambiguous,
-        ));
+        let cause = Cause {
+            id: hyp.id,
+            kind: hyp.kind,
+            sentence,
+            parameters,
+            evidence: lost_nats,
+            probability: 0.0,
+            confused_with,
+        };
+        out.push((cause, rivalled));
+    }
+    let weights = weights(&models);
+    for (cause, _) in &mut out {
+        let holds = |m: &Weighed, id| m.causes.contains(&id);
+        cause.probability = probability(&models, &weights, |m| holds(m, cause.id));
+        for rival in &mut cause.confused_with {
+            let instead = |m: &Weighed| holds(m, rival.id) && !holds(m, cause.id);
+            rival.probability = probability(&models, &weights, instead);
+        }
     }
     out.sort_by(|a, b| b.0.evidence.total_cmp(&a.0.evidence));
     out
 }
 
-fn gain(
-    plant: &Plant,
-    reference: &Reference,
-    held: Vec<Prepared>,
-    fit: &Fit,
-    executor: &dyn Executor,
-) -> Result<Gain, DiagnosisError> {
-    let problem = Problem::with(plant, held, reference.clone(), executor)?;
+fn gain(plant: &Plant, problem: &Problem<'_>, fit: &Fit) -> Gain {
+    let reference = &problem.reference;
     let errors = |t| problem.drives.iter().map(|d| drive_error(d, plant, t)).collect::<Vec<_>>();
     let (before, after) = (errors(&reference.theta), errors(&fit.theta));
-    let norm = |t| problem.gram(t, &[]).0.per_drive.iter().map(|g| g[(0, 0)]).collect::<Vec<_>>();
-    let gains: Vec<f64> =
-        norm(&reference.theta).iter().zip(norm(&fit.theta)).map(|(b, a)| 0.5 * (b - a)).collect();
+    let gains = gains(problem, &reference.theta, &fit.theta);
     let both = |f: fn(&DriveError) -> [f64; 2]| BeforeAfter {
         before: rms(before.iter().map(f)),
         after: rms(after.iter().map(f)),
@@ -335,14 +394,14 @@ fn gain(
         if m > 0.0 { f64::abs(d) / m } else { 0.0 }
     };
     let total: f64 = gains.iter().sum();
-    Ok(Gain {
+    Gain {
         held_out: problem.drives.iter().map(|d| d.name.clone()).collect(),
         speed_rmse_m_s: both(|e| e.speed),
         yaw_rate_rmse_rad_s: both(|e| e.yaw),
         fuel_error_frac: BeforeAfter { before: fuel(&before), after: fuel(&after) },
         log_score_nats: total,
         significant: total > 3.0 && gains.iter().all(|g| *g > -3.0),
-    })
+    }
 }
 
 /// Root mean square of the measured signal of a module over its rows.

@@ -5,7 +5,7 @@ use crate::Plant;
 use crate::param::Theta;
 use crate::problem::replay;
 use crate::replay::force::Longitudinal;
-use crate::replay::{Module, Prepared, fuel_noise_g_s};
+use crate::replay::{Module, Prepared};
 
 /// Length of a rollout, s.
 pub(crate) const HORIZON_S: f64 = 60.0;
@@ -74,7 +74,7 @@ pub(crate) fn drive_error_by(
     {
         if *ok {
             let measured = d.fuel[4 * k..4 * k + 4].iter().sum::<f64>() * 0.25;
-            e.fuel[0] -= x * fuel_noise_g_s(measured);
+            e.fuel[0] -= x * d.fuel_noise_g_s[k];
             e.fuel[1] += measured;
         }
     }

@@ -3,8 +3,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
-use crate::problem::{Direction, Problem};
+use crate::problem::Direction;
 use crate::refit::{Fit, prior};
 use crate::stats::evidence;
 
@@ -36,7 +37,7 @@ fn about(fit: &Fit, member: usize) -> Vec<f64> {
     fit.gram.per_drive.iter().map(of).collect()
 }
 
-impl Problem<'_> {
+impl dyn Evidence + '_ {
     /// Variances of the free parameters, widened by what the drives disagree about.
     ///
     /// The drives' score contributions `s_i` scatter as the information says if the model's form
@@ -71,7 +72,7 @@ impl Problem<'_> {
 
     /// Gradient of every drive at the fit, less its part of the prior's.
     fn pulls(&self, fit: &Fit) -> Vec<DVector<f64>> {
-        let zero = &self.reference.theta;
+        let zero = self.zero();
         let sigma = prior(&fit.free);
         let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
         let pull = DVector::from_fn(k, |j, _| {
@@ -89,7 +90,7 @@ impl Problem<'_> {
         let (pulls, sigma) = (self.pulls(fit), prior(&fit.free));
         let freedom = pulls.len() as f64 - 1.0;
         fit.free.iter().enumerate().any(|(j, p)| {
-            let x = fit.theta[*p as usize] - self.reference.theta[*p as usize];
+            let x = fit.theta[*p as usize] - self.zero()[*p as usize];
             let evidence = 0.5 * x * x / fit.covariance[(j, j)].max(f64::MIN_POSITIVE);
             let drives = fit.gram.per_drive.iter().zip(&pulls);
             let share = 1.0 / (sigma[j] * sigma[j] * pulls.len() as f64);
@@ -111,7 +112,7 @@ impl Problem<'_> {
                 owner.push(i);
             }
         }
-        let (gram, _) = self.gram(&self.reference.theta, &dirs);
+        let (gram, _) = self.gram(self.zero(), &dirs);
         let (a, _, _) = gram.sum(|_| true);
         let mut out = vec![0.0_f64; CATALOGUE.len()];
         for (j, i) in owner.iter().enumerate() {
@@ -128,7 +129,7 @@ impl Problem<'_> {
         let mut i = 0;
         while i < fit.set.len() {
             let hyp = &CATALOGUE[fit.set[i]];
-            let size = hyp.size(&fit.theta, &self.reference.theta).abs();
+            let size = hyp.size(&fit.theta, self.zero()).abs();
             let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, i);
             let (set, theta) = self.without(&fit, i);
             let Some(fewer) = self.fit(&set, &theta, empty.norm) else { return empty.clone() };
@@ -163,17 +164,17 @@ impl Problem<'_> {
         let variances = self.variances(fit);
         let sizes = CATALOGUE[fit.set[member]].sizes;
         fit.free.iter().zip(&variances).any(|(p, v)| {
-            let x = fit.theta[*p as usize] - self.reference.theta[*p as usize];
+            let x = fit.theta[*p as usize] - self.zero()[*p as usize];
             sizes.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
         })
     }
 
     /// Gain of the `i`-th member on unseen halves of the drives, nats.
     fn folds(&self, fit: &Fit, member: usize) -> f64 {
-        if self.drives.len() < 2 {
+        if self.drives() < 2 {
             return f64::INFINITY;
         }
-        let zero = &self.reference.theta;
+        let zero = self.zero();
         let sigma = prior(&fit.free);
         let own: Vec<bool> =
             fit.free.iter().map(|p| CATALOGUE[fit.set[member]].params().any(|q| q == *p)).collect();

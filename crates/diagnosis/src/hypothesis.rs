@@ -37,6 +37,9 @@ const LONG: &[C] = &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::Grad
 /// Where the fit of the shape parameters begins, in their order.
 pub(crate) type Start = [f64; 2];
 
+/// Part of the width between its bounds within which a figure counts as at one.
+const BOUND: f64 = 1e-3;
+
 const ONE: &[Start] = &[[0.0; 2]];
 
 #[expect(clippy::too_many_arguments, reason = "a row of the table below")]
@@ -387,6 +390,15 @@ impl Hypothesis {
         let values: Vec<f64> =
             self.sizes.iter().map(|p| t[*p as usize] - zero[*p as usize]).collect();
         if values.len() == 1 { values[0] } else { values.iter().map(|v| v * v).sum::<f64>().sqrt() }
+    }
+
+    /// One of its sizes has run to a bound: the fit would go on.
+    pub(crate) fn is_at_bound(&self, t: &Theta, zero: &Theta) -> bool {
+        self.sizes.iter().any(|p| {
+            let (s, x) = (p.spec(), t[*p as usize] - zero[*p as usize]);
+            let near = BOUND * (s.hi - s.lo);
+            x <= s.lo + near && s.lo < 0.0 || x >= s.hi - near
+        })
     }
 
     /// Nonlinear enough that a linear screen may miss it.

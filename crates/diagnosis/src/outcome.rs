@@ -8,7 +8,8 @@ use dynamics::{Overlay, TruckParameters};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::report::{Report, report};
+use crate::hypothesis::CATALOGUE;
+use crate::report::{GainInterval, Report, report};
 use crate::{
     Cause, Diagnosis, DiagnosisError, DriveSet, Executor, Extension, NotObservable, Options, Plant,
     Progress, TableTrial, diagnose, extend, try_table,
@@ -92,8 +93,18 @@ impl Outcome {
             if built_in { request.truck_name.to_owned() } else { format!("{name}.base.toml") };
         let extended = format!("{name}.extended");
         self.extension = match &self.found.gain {
-            Some(gain) if gain.is_loss() => withheld(&self.found.causes),
-            _ => extend(request.truck, &base, &extended, &self.found.causes, origin),
+            Some(gain) if !gain.significant => Extension {
+                overlay: None,
+                not_carried: not_carried(&self.found.causes, |_| Some(NOT_SIGNIFICANT.to_owned())),
+            },
+            _ => {
+                let causes = &self.found.causes;
+                let kept = causes.iter().filter(|c| self.speaks_against(c).is_none());
+                let kept: Vec<Cause> = kept.cloned().collect();
+                let mut out = extend(request.truck, &base, &extended, &kept, origin);
+                out.not_carried.extend(not_carried(causes, |c| self.speaks_against(c)));
+                out
+            }
         };
         if let Some(effect) = self.table.as_ref().and_then(|t| t.effect.clone()) {
             let overlay = self.extension.overlay.get_or_insert_with(|| Overlay {
@@ -116,6 +127,25 @@ impl Outcome {
             self.found.extended_truck = Some(file);
         }
         Ok(())
+    }
+
+    /// Why a cause must not enter the extended truck: what it does makes an error on the drives held
+    /// out larger beyond its interval, or its size is where the search was not allowed to go on.
+    fn speaks_against(&self, cause: &Cause) -> Option<String> {
+        let hypotheses = || CATALOGUE.iter().filter(|h| h.id == cause.id);
+        let models = &self.found.models;
+        if hypotheses().any(|h| h.is_at_bound(&models.after, &models.before)) {
+            return Some("its size has run to a bound".to_owned());
+        }
+        let shows = |g: &&GainInterval| {
+            let modules = hypotheses().flat_map(|h| h.groups()).flat_map(|g| g.modules());
+            g.lost && modules.into_iter().any(|m| m.quantity() == g.quantity)
+        };
+        let worse = self.figures.gains.iter().find(shows)?;
+        Some(format!(
+            "on the drives held out the error of {} grows from {:.4} to {:.4}",
+            worse.quantity, worse.before, worse.after
+        ))
     }
 
     /// Writes the extended truck into a folder that exists, and loads it again.
@@ -166,12 +196,15 @@ impl Outcome {
     }
 }
 
-/// No extension, because drives that were held out speak against it.
-fn withheld(causes: &[Cause]) -> Extension {
-    let why = "the drives held out are worse with it than without".to_owned();
-    let not =
-        |c: &Cause| NotObservable { id: c.id, why: why.clone(), missing_channels: Vec::new() };
-    Extension { overlay: None, not_carried: causes.iter().map(not).collect() }
+const NOT_SIGNIFICANT: &str = "the drives held out do not show that it makes the truck better";
+
+/// The causes that `why` gives a reason for.
+fn not_carried(causes: &[Cause], why: impl Fn(&Cause) -> Option<String>) -> Vec<NotObservable> {
+    let of = |c: &Cause| {
+        let why = why(c)?;
+        Some(NotObservable { id: c.id, why, missing_channels: Vec::new() })
+    };
+    causes.iter().filter_map(of).collect()
 }
 
 /// A truck's name as a file name.

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use dynamics::{Overlay, OverlayValue, TruckParameters};
 use tractrix_core::RPM_PER_RAD_S;
 
-use crate::replay::{CRUISE_RPM, LOW_LOAD_FRAC, RETARDER_POWER_W};
+use crate::replay::{CRUISE_RPM, LOW_LOAD_FRAC, RETARDER_LAG_S, RETARDER_POWER_W};
 use crate::{Cause, NotObservable};
 
 /// An overlay and what could not go into it.
@@ -167,6 +167,9 @@ impl Carry {
                     ("driveline.retarder_torque_nm", "driveline.retarder_power_w");
                 let mut out = one(torque, now(torque) + value, sigma);
                 out.extend(one(power, now(power).max(RETARDER_POWER_W), 0.0));
+                if now(torque) == 0.0 {
+                    out.extend(one("driveline.retarder_lag_s", RETARDER_LAG_S, 0.0));
+                }
                 out
             }
             Self::BrakeDemand => {
@@ -291,6 +294,7 @@ mod tests {
                 })
                 .collect(),
             evidence: 40.0,
+            probability: 1.0,
             confused_with: Vec::new(),
         }
     }

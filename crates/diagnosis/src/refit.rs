@@ -2,9 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, Theta};
-use crate::problem::{Direction, Gram, Problem};
+use crate::problem::{Direction, Gram};
 use crate::replay::MODULES;
 use crate::stats::evidence;
 
@@ -148,10 +149,10 @@ struct Standing {
     along: Vec<Direction>,
 }
 
-impl Problem<'_> {
+impl dyn Evidence + '_ {
     /// Fits the parameters of a set by Gauss-Newton with step halving, from `start`.
     pub(crate) fn fit(&self, set: &[usize], start: &Theta, zero_norm: f64) -> Option<Fit> {
-        let free = Free::of(set, self.reference.theta);
+        let free = Free::of(set, *self.zero());
         let along = directions(&free.params, start);
         let (gram, chi) = self.gram(start, &along);
         let began = free.cost(gram.sum(|_| true).2, start);
@@ -218,7 +219,7 @@ impl Problem<'_> {
         let log_det: f64 = 2.0 * (0..k).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
         let inverse = chol.inverse();
         let covariance = DMatrix::from_fn(k, k, |i, j| sigma[i] * inverse[(i, j)] * sigma[j]);
-        let zero = self.chi_at_reference();
+        let zero = self.chi_at_zero();
         Some(Fit {
             set: set.to_vec(),
             theta: at.theta,

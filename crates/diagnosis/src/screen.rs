@@ -3,9 +3,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::evidence::Evidence;
 use crate::hypothesis::{CATALOGUE, Start};
 use crate::param::P;
-use crate::problem::{Direction, Problem};
+use crate::problem::Direction;
 use crate::refit::{Fit, directions, prior};
 use crate::stats::evidence;
 
@@ -122,7 +123,7 @@ impl Screen {
     }
 }
 
-impl Problem<'_> {
+impl dyn Evidence + '_ {
     /// Gram matrix of the free parameters and of the directions of all hypotheses in `open`.
     pub(crate) fn screen(&self, fit: &Fit, open: &[usize]) -> Screen {
         let mut dirs = directions(&fit.free, &fit.theta);
@@ -155,7 +156,7 @@ impl Problem<'_> {
         let (gram, _) = self.gram(&fit.theta, &dirs);
         let (a, b, _) = gram.sum(|_| true);
         // Residual at zero in the linear model: r0 = r + G (theta - zero) for the free ones.
-        let zero = &self.reference.theta;
+        let zero = self.zero();
         let shift = DVector::from_fn(dirs.len(), |i, _| {
             fit.free.get(i).map_or(0.0, |p| fit.theta[*p as usize] - zero[*p as usize])
         });

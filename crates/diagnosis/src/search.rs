@@ -7,9 +7,9 @@
 //! modules, whichever is more. The relative rule stops helpers that patch the model-form error of a
 //! large effect.
 
+use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::param::{PARAMS, Theta};
-use crate::problem::Problem;
 use crate::refit::Fit;
 use crate::screen::{Candidate, Screen, outside};
 
@@ -27,7 +27,7 @@ const HOPELESS: f64 = 2.0;
 /// Pairs refitted.
 const PAIRS: usize = 3;
 
-impl Problem<'_> {
+impl dyn Evidence + '_ {
     /// The best set of causes among `open`. `bare` is the evidence of the best free function: where
     /// it stays far above that of two causes, others only patch what the catalogue does not have.
     pub(crate) fn search(
@@ -37,7 +37,7 @@ impl Problem<'_> {
         bare: f64,
         progress: &mut dyn FnMut(usize),
     ) -> Option<(Fit, Fit)> {
-        let zero = self.reference.theta;
+        let zero = *self.zero();
         let (g, _) = self.gram(&zero, &[]);
         let zero_norm = g.sum(|_| true).2;
         let empty = self.fit(&[], &zero, zero_norm)?;
@@ -99,7 +99,7 @@ impl Problem<'_> {
 
     /// What `next` must add to `best`. What is added in modules of which much is explained may patch
     /// the form of a larger cause; the part that falls on other modules does not.
-    fn threshold(&self, best: &Fit, next: &Fit) -> f64 {
+    pub(crate) fn threshold(&self, best: &Fit, next: &Fit) -> f64 {
         let Some(added) = next.set.iter().find(|h| !best.set.contains(h)) else {
             return f64::INFINITY;
         };
@@ -171,7 +171,7 @@ impl Problem<'_> {
                 let little = 0.5 * s.step * if hyp.sign < 0.0 { -1.0 } else { 1.0 };
                 // The sign of what is not linear decides where a fit ends.
                 let from = if hyp.nonlinear() { linear.clamp(s.lo, s.hi) } else { little };
-                theta[*p as usize] = self.reference.theta[*p as usize] + from;
+                theta[*p as usize] = self.zero()[*p as usize] + from;
             }
             self.fit(&set, &theta, zero_norm)
         });
@@ -226,7 +226,7 @@ impl Problem<'_> {
         let gone = set.remove(i);
         let mut theta = fit.theta;
         for p in CATALOGUE[gone].params() {
-            theta[p as usize] = self.reference.theta[p as usize];
+            theta[p as usize] = self.zero()[p as usize];
         }
         debug_assert_eq!(theta.len(), PARAMS);
         (set, theta)

@@ -4,7 +4,7 @@
 use crate::Unknown;
 use crate::catch_all::Left;
 use crate::hypothesis::CATALOGUE;
-use crate::param::{P, Theta};
+use crate::param::Theta;
 use crate::problem::Problem;
 use crate::refit::Fit;
 use crate::replay::Module;
@@ -38,9 +38,6 @@ const MISFIT: f64 = 1.2;
 /// Part of the variance that causes take from a module, beyond that of drives in order, below which
 /// what they leave is of their form.
 const FORM: f64 = 0.12;
-
-/// Part of the width between its bounds within which a figure counts as at one.
-const BOUND: f64 = 1e-3;
 
 /// Evidence, and part of the causes' evidence, that a force without a name may add before causes of
 /// the force balance are not sure.
@@ -85,8 +82,11 @@ pub(crate) fn judge(
     if let Some(left) = doubt() {
         return (fit, unknown.or(Some(resembling(&left))), Sure::Not);
     }
-    let sure =
-        if stands_in(problem, &fit) || problem.disagree(&fit) { Sure::Not } else { Sure::Yes };
+    let sure = if stands_in(problem, &fit) || problem.evidence().disagree(&fit) {
+        Sure::Not
+    } else {
+        Sure::Yes
+    };
     (fit, unknown, sure)
 }
 
@@ -152,8 +152,10 @@ fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fi
             i += 1;
             continue;
         }
-        let (fewer, theta) = problem.without(&left, i);
-        let Some(refit) = problem.fit(&fewer, &theta, empty.norm) else { return empty.clone() };
+        let (fewer, theta) = problem.evidence().without(&left, i);
+        let Some(refit) = problem.evidence().fit(&fewer, &theta, empty.norm) else {
+            return empty.clone();
+        };
         left = refit;
     }
     if left.log_z > UNKNOWN_EVIDENCE { left } else { empty.clone() }
@@ -203,11 +205,8 @@ fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
         let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
         share >= 3 || (share > 0 && excess > MISFIT && !form(problem, fit, m))
     });
-    let at_bound = |p: &P| {
-        let (s, x) = (p.spec(), fit.theta[*p as usize] - problem.reference.theta[*p as usize]);
-        x <= s.lo + BOUND * (s.hi - s.lo) && s.lo < 0.0 || x >= s.hi - BOUND * (s.hi - s.lo)
-    };
-    strained || fit.set.iter().flat_map(|h| CATALOGUE[*h].sizes).any(at_bound)
+    let zero = &problem.reference.theta;
+    strained || fit.set.iter().any(|h| CATALOGUE[*h].is_at_bound(&fit.theta, zero))
 }
 
 fn describe(shapes: &[Shape]) -> Option<Unknown> {

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::drive::Drive;
 use crate::param::Theta;
 use crate::problem::{Problem, Rest};
-use crate::replay::{Module, Prepared, fuel_noise_g_s};
+use crate::replay::{Module, Prepared};
 use crate::stats::evidence;
 
 /// Knots of the spline.
@@ -128,11 +128,12 @@ fn means_of(x: &[f64], step: usize) -> Vec<f64> {
 /// unit of the `residual`. The measured one would carry the residual's own noise.
 fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
     let measured = means_of(d.measured(module), module.row_step());
-    let modelled = |(x, r): (&f64, &f64)| match module {
-        Module::Fuel => x / fuel_noise_g_s(*x) - r,
-        _ => x - r,
+    let scale = |k: usize| match module {
+        Module::Fuel => d.fuel_noise_g_s.get(k).copied().unwrap_or(1.0),
+        _ => 1.0,
     };
-    measured.iter().zip(residual).map(modelled).collect()
+    let modelled = |(k, (x, r)): (usize, (&f64, &f64))| x / scale(k) - r;
+    measured.iter().zip(residual).enumerate().map(modelled).collect()
 }
 
 /// How much more the drives disagree about a free function than their noise says, at least 1: the

@@ -3,9 +3,9 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-use crate::Finding;
 use crate::hypothesis::CauseKind;
 use crate::report_models::Models;
+use crate::{Detectable, Finding};
 
 /// What the search concludes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -59,6 +59,8 @@ pub struct Confusion {
     pub id: &'static str,
     /// Why, and what would separate them.
     pub why: String,
+    /// How probable it is in the place of the named one.
+    pub probability: f64,
 }
 
 /// A named cause.
@@ -74,6 +76,8 @@ pub struct Cause {
     pub parameters: BTreeMap<&'static str, Parameter>,
     /// Log evidence that is lost without it, nats.
     pub evidence: f64,
+    /// How probable it is, of the models that were compared.
+    pub probability: f64,
     /// What it could be instead.
     pub confused_with: Vec<Confusion>,
 }
@@ -134,15 +138,6 @@ pub struct Gain {
     pub significant: bool,
 }
 
-impl Gain {
-    /// The drives that were held out speak against the extension: their score falls. An error may
-    /// grow with a right cause, where wind and load of the day had hidden it.
-    #[must_use]
-    pub fn is_loss(&self) -> bool {
-        self.log_score_nats < 0.0
-    }
-}
-
 /// Everything that was concluded.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -162,6 +157,8 @@ pub struct Diagnosis {
     pub unknown: Option<Unknown>,
     /// Causes that these drives cannot show.
     pub not_observable: Vec<NotObservable>,
+    /// What these drives would have shown, by id.
+    pub detectable: Vec<Detectable>,
     /// Gain on held-out drives.
     pub gain: Option<Gain>,
     /// File name of the extended truck, if there is one.

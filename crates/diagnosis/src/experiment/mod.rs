@@ -317,7 +317,7 @@ mod tests {
         let norm = problem.gram(&theta, &[]).0.sum(|_| true).2;
         let log_z = |id: &str| {
             let h = CATALOGUE.iter().position(|h| h.id == id).unwrap();
-            problem.fit(&[h], &theta, norm).unwrap().log_z
+            problem.evidence().fit(&[h], &theta, norm).unwrap().log_z
         };
         let found = log_z(ids[0]) - log_z(ids[1]);
         assert!(expected > 20.0, "{expected}");

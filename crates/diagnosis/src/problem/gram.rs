@@ -18,9 +18,9 @@ use crate::unknown::KNOTS;
 pub(crate) struct Gram {
     pub(crate) per_drive: Vec<DMatrix<f64>>,
     /// Products of the common effects with `[r, columns]`, per drive.
-    common: Vec<DMatrix<f64>>,
+    pub(crate) common: Vec<DMatrix<f64>>,
     /// Information of a drive about the common effects.
-    own: Arc<Vec<DMatrix<f64>>>,
+    pub(crate) own: Arc<Vec<DMatrix<f64>>>,
 }
 
 impl Gram {

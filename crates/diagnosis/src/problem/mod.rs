@@ -88,8 +88,10 @@ impl<'a> Problem<'a> {
         let reference = Reference::start(&drives, &residuals, theta, clean);
         let mut problem = Self::with(plant, drives, reference, executor)?;
         for round in 0..2 {
-            if clean || round > 0 {
-                problem.calibrate(clean, round == 0)?;
+            if clean {
+                problem.calibrate(round == 0)?;
+            } else {
+                problem.recentre()?;
             }
             if clean && round > 0 {
                 problem.scatter();

@@ -23,6 +23,8 @@ pub(super) const EDGE: usize = 4;
 
 /// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
 pub(crate) const RETARDER_POWER_W: f64 = 400_000.0;
+/// Lag of such a retarder, s: as fast as an engine brake, for nobody knows what it is.
+pub(crate) const RETARDER_LAG_S: f64 = 0.2;
 
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[super::Module::Force as usize];
@@ -263,6 +265,9 @@ fn fan(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
 fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<Arc<[f64]>> {
     let mut driveline = plant.truck.driveline.clone();
     if extra_nm != 0.0 {
+        if driveline.retarder_torque_nm == 0.0 {
+            driveline.retarder_lag_s = RETARDER_LAG_S;
+        }
         driveline.retarder_torque_nm += extra_nm;
         driveline.retarder_power_w = driveline.retarder_power_w.max(RETARDER_POWER_W);
     }

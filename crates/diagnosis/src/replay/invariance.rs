@@ -89,6 +89,7 @@ fn part(h: &Hypothesis, part: f64) -> (Theta, Cause) {
         sentence: String::new(),
         parameters,
         evidence: 0.0,
+        probability: 1.0,
         confused_with: Vec::new(),
     };
     (theta, cause)

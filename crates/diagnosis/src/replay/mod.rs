@@ -16,8 +16,7 @@ mod profiles;
 mod sensors;
 mod smooth;
 
-pub(crate) use force::RETARDER_POWER_W;
-pub(crate) use powertrain::noise_g_s as fuel_noise_g_s;
+pub(crate) use force::{RETARDER_LAG_S, RETARDER_POWER_W};
 pub(crate) use powertrain::{CRUISE_RPM, LOW_LOAD_FRAC};
 pub(crate) use prepared::Prepared;
 

@@ -7,6 +7,7 @@ use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
+use super::smooth;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -126,6 +127,9 @@ pub(crate) const LOW_LOAD_FRAC: f64 = 0.3;
 /// Engine speed at which a load is a power, rpm: where highway trucks cruise.
 pub(crate) const CRUISE_RPM: f64 = 1_250.0;
 
+/// Samples over which a fuel rate is steady enough to be scaled: a second.
+const STEADY: usize = 21;
+
 /// Fuel rate, over its noise scale (a constant part and one percent of the rate).
 pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Fuel as usize];
@@ -140,6 +144,9 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let rate = d.profiles.get(Kind::Willans, [lag], || {
         (0..d.n).map(|i| plant.engine.fuel_rate_g_s(omega(i), torque(i))).collect()
     });
+    // A scale that multiplied the torque message's noise would be fitted to damp that noise, with a
+    // free function to make up for its level.
+    let steady = d.profiles.get(Kind::SteadyRate, [lag], || smooth::running_mean(&rate, STEADY));
     // What is low: torque over the full load at this speed, power, or torque, these two over full
     // load at cruise.
     let over = t[P::FuelLowOver as usize];
@@ -169,16 +176,30 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
             for i in 4 * k..4 * k + 4 {
                 let extra = low * (1.0 - load[i] * per_load).max(0.0);
                 measured += 0.25 * d.fuel[i];
-                modelled += 0.25 * rate[i] * scale * (1.0 + extra);
+                modelled += 0.25 * (rate[i] * (1.0 + extra) + steady[i] * (scale - 1.0));
             }
-            (measured - modelled) / (noise_g_s(measured) * calmed)
+            (measured - modelled) / (d.fuel_noise_g_s[k] * calmed)
         })
         .collect()
 }
 
-/// Noise of a fuel rate, g/s: a constant part and one percent of the rate.
-pub(crate) fn noise_g_s(rate_g_s: f64) -> f64 {
-    0.03 + 0.01 * rate_g_s
+/// How far a held message of the fuel rate is from its time, s: it comes every 100 ms (J1939 PGN
+/// 65266), and what is spread evenly over that has this standard deviation.
+const HELD_S: f64 = 0.029;
+
+/// Noise of the fuel rate per row, g/s: a constant part, one percent of the rate, and what it changes
+/// while its message is held.
+pub(super) fn noise_g_s(fuel_g_s: &[f64]) -> Vec<f64> {
+    let step = M::Fuel.row_step();
+    let rows: Vec<f64> =
+        fuel_g_s.chunks(step).map(|r| r.iter().sum::<f64>() / r.len() as f64).collect();
+    let last = rows.len().saturating_sub(1);
+    let of = |k: usize| {
+        let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
+        let per_s = (rows[to] - rows[from]) / ((to - from).max(1) * step) as f64 / Drive::STEP_S;
+        (0.03 + 0.01 * rows[k]).hypot(HELD_S * per_s)
+    };
+    (0..rows.len()).map(of).collect()
 }
 
 #[cfg(test)]

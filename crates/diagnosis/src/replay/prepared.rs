@@ -51,6 +51,8 @@ pub(crate) struct Prepared {
     pub(crate) s_map: Vec<f64>,
     pub(crate) grade_by_s: GradeBySection,
     /// Full-load torque at the engine speed and in the air of every sample, Nm.
+    /// Noise of the fuel rate per row, g/s.
+    pub(crate) fuel_noise_g_s: Vec<f64>,
     pub(super) full_load: Vec<f64>,
     pub(super) balance: Inputs,
     pub(super) profiles: Profiles,
@@ -186,6 +188,7 @@ impl Prepared {
             coolant: smooth::running_mean(&get(C::CoolantTempDegc, 80.0), smooth::COOLANT),
             curvature: get(C::Curvature1M, 0.0),
             grade_by_s: GradeBySection::new(&s_map, &grade),
+            fuel_noise_g_s: super::powertrain::noise_g_s(&get(C::FuelRateGS, 0.0)),
             full_load,
             omega,
             turning,

@@ -36,6 +36,8 @@ pub struct GainInterval {
     pub fall_frac_interval: Interval,
     /// The fall is significant.
     pub claimed: bool,
+    /// The error grows beyond its interval, and on every drive.
+    pub lost: bool,
 }
 
 /// Bootstrap samples.
@@ -123,6 +125,7 @@ fn interval(
     let at = |p: f64| falls[((RESAMPLES - 1) as f64 * p).round() as usize];
     let fall_frac = fall(total);
     let fall_frac_interval = [at(0.05), at(0.95)];
+    let everywhere = drives.iter().all(|d| fall(d.iter().fold([0.0; 3], add)) < 0.0);
     Some(GainInterval {
         quantity,
         title,
@@ -132,6 +135,7 @@ fn interval(
         fall_frac,
         fall_frac_interval,
         claimed: fall_frac_interval[0] > 0.0 && fall_frac > LEAST_FALL_FRAC,
+        lost: fall_frac_interval[1] < 0.0 && fall_frac < -LEAST_FALL_FRAC && everywhere,
     })
 }
 
@@ -169,6 +173,15 @@ mod tests {
         assert!(g.claimed && (g.fall_frac - 0.5).abs() < 0.1, "{g:?}");
         assert!(g.fall_frac_interval[0] < g.fall_frac && g.fall_frac < g.fall_frac_interval[1]);
         assert_eq!(interval("q", "t", 0.0, &windows(1, 0.75), 1).unwrap(), g);
+    }
+
+    #[test]
+    fn a_clear_loss_on_every_drive_is_one_and_a_loss_on_one_of_two_is_none() {
+        let g = interval("q", "t", 0.0, &windows(1, -0.5), 1).unwrap();
+        assert!(g.lost && !g.claimed, "{g:?}");
+        let mixed = [windows(1, -0.9)[0].clone(), windows(1, 0.1)[1].clone()];
+        assert!(!interval("q", "t", 0.0, &mixed, 1).unwrap().lost);
+        assert!(!interval("q", "t", 0.0, &windows(1, 0.75), 1).unwrap().lost);
     }
 
     #[test]

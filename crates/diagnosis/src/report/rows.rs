@@ -32,8 +32,8 @@ impl Rows {
             v
         };
         let mut sigma = m.sigma;
-        let mean_fuel_g_s = drive.fuel.iter().sum::<f64>() / drive.n.max(1) as f64;
-        sigma[Module::Fuel as usize] *= crate::replay::fuel_noise_g_s(mean_fuel_g_s);
+        let rows = drive.fuel_noise_g_s.len().max(1) as f64;
+        sigma[Module::Fuel as usize] *= drive.fuel_noise_g_s.iter().sum::<f64>() / rows;
         let residuals = |theta| physical(&drive, replay(&drive, plant, theta));
         Self {
             before: residuals(&m.before),
@@ -87,12 +87,8 @@ impl Rows {
 
 /// The fuel residual is over its noise scale; the others are in their quantity's unit.
 fn physical(d: &Prepared, mut r: Residuals) -> Residuals {
-    let step = Module::Fuel.row_step();
-    for (k, x) in r[Module::Fuel as usize].iter_mut().enumerate() {
-        if let Some(row) = d.fuel.get(k * step..(k + 1) * step) {
-            let mean = row.iter().sum::<f64>() / step as f64;
-            *x *= crate::replay::fuel_noise_g_s(mean);
-        }
+    for (x, noise) in r[Module::Fuel as usize].iter_mut().zip(&d.fuel_noise_g_s) {
+        *x *= noise;
     }
     r
 }

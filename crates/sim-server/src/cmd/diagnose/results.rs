@@ -52,10 +52,16 @@ impl Results {
         let Outcome { found, figures, extension, table, .. } = &self.outcome;
         let mut lines = vec![verdict(found)];
         for cause in &found.causes {
-            lines.push(format!("  {} (evidence {:.0} nats)", cause.sentence, cause.evidence));
+            lines.push(format!(
+                "  {} (probability {:.0} %, evidence {:.0} nats)",
+                cause.sentence,
+                100.0 * cause.probability,
+                cause.evidence
+            ));
             lines.push(format!("    {}", diagnosis::report::advice(cause.id)));
             for other in &cause.confused_with {
-                lines.push(format!("    could be {}: {}", other.id, other.why));
+                let percent = 100.0 * other.probability;
+                lines.push(format!("    could be {} ({percent:.0} %): {}", other.id, other.why));
             }
         }
         if let Some(u) = &found.unknown {

@@ -76,7 +76,7 @@ function why() {
     box.append(node("b", c.sentence));
     box.append(node("em", DATA.advice[c.id]));
     const sizes = Object.entries(c.parameters).map(([k, p]) => `${words(k)} ${fixed(p.value, 4)} ± ${fixed(p.sigma, 2)}${p.unit === "1" ? "" : " " + p.unit}`);
-    box.append(node("small", `${words(c.id)} (${words(c.kind)}): ${sizes.join("; ")}; evidence ${fixed(c.evidence, 3)} nats`));
+    box.append(node("small", `${words(c.id)} (${words(c.kind)}): ${sizes.join("; ")}; probability ${percent(c.probability)}, evidence ${fixed(c.evidence, 3)} nats`));
     where.append(box);
   }
   if (D.unknown) {
@@ -141,7 +141,7 @@ function gain() {
   } else clear("gain-plot");
   table("gain-table", [{ name: "Error" }, { name: "Before", number: true }, { name: "After", number: true }, { name: "Unit" }, { name: "Fall (90 %)", number: true }, { name: "Claimed" }],
     R.gains.map((g) => [g.horizon_s ? `${g.title}, ${g.horizon_s} s` : g.title, fixed(g.before), fixed(g.after), split(g.quantity)[1],
-      `${percent(g.fall_frac)} (${percent(g.fall_frac_interval[0])} to ${percent(g.fall_frac_interval[1])})`, g.claimed ? node("span", "yes", "yes") : "no"]));
+      `${percent(g.fall_frac)} (${percent(g.fall_frac_interval[0])} to ${percent(g.fall_frac_interval[1])})`, g.claimed ? node("span", "yes", "yes") : g.lost ? "worse" : "no"]));
 }
 
 function loop() {
@@ -187,12 +187,17 @@ function maps() {
 }
 
 function rest() {
-  const confused = D.causes.flatMap((c) => c.confused_with.map((o) => [words(c.id), words(o.id), o.why]));
-  if (confused.length) table("confused-table", [{ name: "Named" }, { name: "Could be" }, { name: "Why, and what separates them" }], confused);
+  const confused = D.causes.flatMap((c) => c.confused_with.map((o) => [words(c.id), words(o.id), percent(o.probability), o.why]));
+  if (confused.length) table("confused-table", [{ name: "Named" }, { name: "Could be" }, { name: "Probability", number: true }, { name: "Why, and what separates them" }], confused);
   else byId("confused-table").append(node("p", D.causes.length ? "No other cause comes within five nats of those named." : "No cause was named."));
   const unseen = D.not_observable.map((n) => [words(n.id), n.why]);
   if (unseen.length) table("unseen-table", [{ name: "Cause" }, { name: "Why" }], unseen);
   else byId("unseen-table").append(node("p", "These drives excite every cause of the catalogue."));
+  if (D.detectable.length) {
+    byId("unseen-table").append(node("p", "Silence about a cause means that it is smaller than this:"));
+    table("unseen-table", [{ name: "Cause" }, { name: "Size" }, { name: "Smallest that shows", number: true }, { name: "Unit" }],
+      D.detectable.map((d) => [words(d.id), words(d.parameter), fixed(d.smallest, 2), d.unit === "1" ? "" : d.unit]));
+  }
   const shown = new Set(["drive", "channel", "time_s", "kind", "action"]);
   const found = D.findings.map((f) => [f.drive, f.channel ?? "", f.time_s === null ? "" : fixed(f.time_s, 5), words(f.kind),
     Object.entries(f).filter(([k]) => !shown.has(k)).map(([k, v]) => `${words(k)} ${v}`).join(", "), words(f.action)]);

@@ -1,0 +1,66 @@
+//! What the search compares explanations by: residuals and sensitivities of a set of drives in one
+//! metric, whatever they come from. The replay is one source; a few given matrices are another
+//! ([`linear`](mod@linear), for tests of microseconds).
+
+#[cfg(test)]
+pub(crate) mod linear;
+
+use crate::param::Theta;
+use crate::problem::{Direction, Gram, Problem};
+use crate::replay::MODULES;
+
+/// Drives seen through their tolerances. Search, fit, screen and gates speak to this alone.
+pub(crate) trait Evidence {
+    /// No cause: where all sizes count from.
+    fn zero(&self) -> &Theta;
+
+    /// How many drives there are.
+    fn drives(&self) -> usize;
+
+    /// Gram matrix of the residual at `theta` and the directions from `from`, and the squared
+    /// whitened residual per module, tolerances included.
+    fn gram_along(
+        &self,
+        theta: &Theta,
+        from: &Theta,
+        directions: &[Direction],
+    ) -> (Gram, [f64; MODULES]);
+
+    /// The squared whitened residual per module at [`Evidence::zero`].
+    fn chi_at_zero(&self) -> [f64; MODULES];
+
+    /// The Gram matrix with residual and directions at the same point.
+    fn gram(&self, theta: &Theta, directions: &[Direction]) -> (Gram, [f64; MODULES]) {
+        self.gram_along(theta, theta, directions)
+    }
+}
+
+impl Evidence for Problem<'_> {
+    fn zero(&self) -> &Theta {
+        &self.reference.theta
+    }
+
+    fn drives(&self) -> usize {
+        self.drives.len()
+    }
+
+    fn gram_along(
+        &self,
+        theta: &Theta,
+        from: &Theta,
+        directions: &[Direction],
+    ) -> (Gram, [f64; MODULES]) {
+        Problem::gram_along(self, theta, from, directions)
+    }
+
+    fn chi_at_zero(&self) -> [f64; MODULES] {
+        self.chi_at_reference()
+    }
+}
+
+impl Problem<'_> {
+    /// This problem as the search sees it.
+    pub(crate) fn evidence(&self) -> &(dyn Evidence + '_) {
+        self
+    }
+}

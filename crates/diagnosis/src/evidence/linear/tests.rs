@@ -1,0 +1,131 @@
+//! What the search makes of evidence that is known exactly.
+
+use super::*;
+use crate::refit::Fit;
+
+const ROWS: usize = 64;
+
+/// Rows that are orthogonal for different `k`, of length one.
+fn wave(k: usize) -> Vec<f64> {
+    let of = |i: usize| {
+        let angle = core::f64::consts::PI * (i as f64 + 0.5) * k as f64 / ROWS as f64;
+        angle.cos() * (2.0 / ROWS as f64).sqrt()
+    };
+    (0..ROWS).map(of).collect()
+}
+
+fn times(x: &[f64], factor: f64) -> Vec<f64> {
+    x.iter().map(|x| x * factor).collect()
+}
+
+fn plus(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
+}
+
+/// One drive of the force balance.
+fn drive(residual: Vec<f64>, columns: &[(P, Vec<f64>)]) -> LinearDrive {
+    let columns = columns.to_vec();
+    LinearDrive { module: Module::Force, residual, columns, tolerances: Vec::new() }
+}
+
+/// The same drive `count` times.
+fn alike(count: usize, residual: &[f64], columns: &[(P, Vec<f64>)]) -> LinearProblem {
+    LinearProblem::new((0..count).map(|_| drive(residual.to_vec(), columns)).collect())
+}
+
+/// The set that the search finds among `ids`, and what the gate leaves of it; with the empty set.
+fn found(problem: &LinearProblem, ids: &[&str]) -> (Vec<&'static str>, Fit, Fit) {
+    let open: Vec<usize> = ids.iter().map(|id| LinearProblem::cause(id)).collect();
+    let evidence: &dyn Evidence = problem;
+    let (empty, fit) = evidence.search(&open, 4, 0.0, &mut |_| {}).unwrap();
+    let fit = evidence.gate(fit, &empty);
+    let names = fit.set.iter().map(|h| CATALOGUE[*h].id).collect();
+    (names, fit, empty)
+}
+
+const ROLLING: &str = "rolling_resistance";
+const DRAG: &str = "air_drag";
+
+/// A cause of one prior deviation leaves this many nats' worth of squares in each of six drives.
+const STRONG: f64 = 40.0;
+
+#[test]
+fn nothing_is_found_where_nothing_is() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let noise = times(&plus(&wave(7), &wave(9)), 4.0);
+    assert!(found(&alike(6, &noise, &columns), &[ROLLING, DRAG]).0.is_empty());
+}
+
+#[test]
+fn orthogonal_causes_are_both_found_with_their_sizes() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let residual = plus(&times(&columns[0].1, 0.3), &times(&columns[1].1, -0.2));
+    let (mut names, fit, _) = found(&alike(6, &residual, &columns), &[ROLLING, DRAG]);
+    names.sort_unstable();
+    assert_eq!(names, [DRAG, ROLLING]);
+    assert!((fit.theta[P::Rolling as usize] - 0.3).abs() < 0.01);
+    assert!((fit.theta[P::Drag as usize] + 0.2).abs() < 0.01);
+}
+
+#[test]
+fn of_a_collinear_pair_one_is_found_and_the_other_says_as_much() {
+    let (one, other) = (wave(1), plus(&times(&wave(1), 0.998), &times(&wave(2), 0.06)));
+    let columns = [(P::Rolling, times(&one, STRONG)), (P::Drag, times(&other, STRONG))];
+    let problem = alike(6, &times(&one, 0.15 * STRONG), &columns);
+    let (names, fit, empty) = found(&problem, &[ROLLING, DRAG]);
+    assert_eq!(names.len(), 1, "{names:?}");
+    let evidence: &dyn Evidence = &problem;
+    let rival = if names[0] == ROLLING { DRAG } else { ROLLING };
+    let screen = evidence.screen(&empty, &[LinearProblem::cause(rival)]);
+    let gain = screen.singles(None)[0].gain;
+    assert!((fit.log_z - gain).abs() < 3.0, "{} {gain}", fit.log_z);
+}
+
+/// A large cause whose course differs by 4 % from the catalogue's leaves what another cause would
+/// take: far more nats than one needs that stands alone.
+#[test]
+fn a_helper_that_patches_the_form_of_a_large_cause_is_not_taken() {
+    let columns = [(P::Rolling, times(&wave(1), 800.0)), (P::Drag, times(&wave(2), 800.0))];
+    let course = plus(&columns[0].1, &times(&wave(2), 0.04 * 800.0));
+    let problem = alike(6, &times(&course, 0.4), &columns);
+    let (names, fit, empty) = found(&problem, &[ROLLING, DRAG]);
+    assert_eq!(names, [ROLLING]);
+    let evidence: &dyn Evidence = &problem;
+    let helper = evidence.screen(&fit, &[LinearProblem::cause(DRAG)]).singles(None)[0].gain;
+    assert!(helper > 50.0 && helper < 0.003 * (fit.log_z - empty.log_z), "{helper}");
+}
+
+#[test]
+fn the_wind_of_one_stormy_drive_is_no_cause() {
+    let columns = [(P::WindX, times(&wave(1), 2.0)), (P::WindY, times(&wave(2), 2.0))];
+    let mut problem = alike(6, &[0.0; ROWS], &columns);
+    problem.drives[2].residual = times(&wave(1), 40.0);
+    assert!(found(&problem, &["wind"]).0.is_empty());
+    // The same push in every drive is one.
+    let problem = alike(6, &times(&wave(1), 16.0), &columns);
+    assert_eq!(found(&problem, &["wind"]).0, ["wind"]);
+}
+
+/// What follows no cause at all costs the cause beside it nothing, and names none.
+#[test]
+fn an_unknown_beside_a_cause_leaves_the_cause_alone() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let unknown = times(&wave(11), 30.0);
+    let residual = plus(&times(&columns[0].1, 0.3), &unknown);
+    let (names, fit, _) = found(&alike(6, &residual, &columns), &[ROLLING, DRAG]);
+    assert_eq!(names, [ROLLING]);
+    assert!((fit.theta[P::Rolling as usize] - 0.3).abs() < 0.01);
+    assert!(found(&alike(6, &unknown, &columns), &[ROLLING, DRAG]).0.is_empty());
+}
+
+#[test]
+fn a_tolerance_that_does_the_same_takes_the_cause_away() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let residual = times(&columns[0].1, 0.1);
+    assert_eq!(found(&alike(6, &residual, &columns), &[ROLLING]).0, [ROLLING]);
+    let mut problem = alike(6, &residual, &columns);
+    for d in &mut problem.drives {
+        d.tolerances = vec![times(&wave(1), STRONG)];
+    }
+    assert!(found(&problem, &[ROLLING]).0.is_empty());
+}
