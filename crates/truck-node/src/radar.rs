@@ -182,7 +182,7 @@ mod tests {
             let off_m = n.rear_s_m - (ego.s_m + 4.0) - gap_m;
             assert!(off_m.abs() < 0.75, "{tick}: {off_m}");
             if tick > 0 {
-                assert!((n.rear_s_m - last - speed_m_s * 0.01).abs() < 0.35, "{tick}");
+                assert!((n.rear_s_m - last - speed_m_s * 0.01).abs() < HALF_STEP.0, "{tick}");
             }
             last = n.rear_s_m;
             // from 5 s on it brakes with 2 m/s²
