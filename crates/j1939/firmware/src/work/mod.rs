@@ -1,4 +1,4 @@
-//! What the firmware and a test on the host do alike; both print the same bits.
+//! What the firmware and a test of truck-node do alike; both print the same bits.
 
 pub mod codec;
 pub mod drive;

@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# The program on the truck for AArch64 Linux: its size, its unit tests under qemu-user, and the same
+# bits as on this computer. The argument is the built test `same_bits`.
+set -euo pipefail
+host=$(realpath "${1:?the test binary same_bits}")
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+target=aarch64-unknown-linux-gnu
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
+export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
+# the bits do not depend on it, and it compiles in half the time
+export CARGO_PROFILE_RELEASE_OPT_LEVEL=1
+
+log=$(mktemp)
+trap 'rm -f "$log" "$log.bin"' EXIT
+timeout 900 cargo test --release --locked --target $target -p truck-node --bins \
+  --test same_bits -- --nocapture >"$log" 2>&1 ||
+  { cat "$log"; exit 1; }
+grep -E '^(test result|     Running)' "$log"
+aarch64-linux-gnu-strip -o "$log.bin" "${CARGO_TARGET_DIR:-target}/$target/release/truck-node"
+bytes=$(stat -c %s "$log.bin")
+printf 'truck-node for AArch64: %s bytes stripped\n' "$bytes"
+[ "$bytes" -lt 10000000 ] || { echo "10,000,000 bytes are the most"; exit 1; }
+if diff <("$host" --nocapture | grep '^bits ') <(grep '^bits ' "$log"); then
+  echo "the same bits as on this computer"
+else
+  echo "other bits than on this computer (above: < this one, > AArch64)"
+  exit 1
+fi
