@@ -70,3 +70,28 @@ fn the_import_graph_is_the_one_of_architecture_md() {
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
+
+/// Also through others: the program on the truck links neither the plant nor an async runtime.
+#[test]
+fn the_program_on_the_truck_is_without_simulation_and_tokio() {
+    let metadata = cargo_metadata::MetadataCommand::new().exec().unwrap();
+    let resolve = metadata.resolve.as_ref().unwrap();
+    let name = |id: &cargo_metadata::PackageId| metadata[id].name.to_string();
+    let mut linked = BTreeSet::new();
+    let mut open: Vec<_> =
+        metadata.packages.iter().filter(|p| p.name == "truck-node").map(|p| &p.id).collect();
+    while let Some(id) = open.pop() {
+        let node = resolve.nodes.iter().find(|node| node.id == *id).unwrap();
+        for dependency in &node.deps {
+            let kinds = &dependency.dep_kinds;
+            let is_linked = kinds.iter().any(|k| k.kind == cargo_metadata::DependencyKind::Normal);
+            if is_linked && linked.insert(name(&dependency.pkg)) {
+                open.push(&dependency.pkg);
+            }
+        }
+    }
+    assert!(linked.contains("mcap") && linked.contains("planner"), "{linked:?}");
+    for never in ["tokio", "axum", "sim", "dynamics", "traffic-client", "diagnosis", "pyo3"] {
+        assert!(!linked.contains(never), "truck-node links {never}");
+    }
+}

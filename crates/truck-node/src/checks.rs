@@ -2,7 +2,7 @@
 
 use j1939::bus::Bus;
 use j1939::ident::{VI, masked};
-use j1939::message::Cvw;
+use j1939::message::{Cvw, Ec1};
 use j1939::supervise::BusFault;
 use j1939::truck::{Engagement, Readiness, lost_after_s};
 use j1939::{ClaimState, Message};
@@ -14,7 +14,7 @@ use crate::node::Truck;
 use crate::roll_call::Present;
 use crate::sheet::BusTable;
 
-/// Number and mass of the truck are asked for so often, one second apart.
+/// Number, mass and reference torque of the truck are asked for so often, one second apart.
 const QUESTIONS: u32 = 5;
 const QUESTION_PERIOD: i64 = 1_000_000_000;
 /// The radar's last word may be so old, s: five of its messages.
@@ -139,9 +139,9 @@ impl Checks {
         Ok(())
     }
 
-    /// Asks for what is told on request alone.
+    /// Asks for what is told on request alone, or may be.
     fn ask(&mut self, now: Time, r: &Readiness, truck: &mut Truck) {
-        let known = r.vin.is_some() && r.mass_kg.is_some();
+        let known = r.vin.is_some() && r.mass_kg.is_some() && r.reference_torque_nm.is_some();
         if known || self.asked >= QUESTIONS || now < self.ask_due || r.claim != ClaimState::Claimed
         {
             return;
@@ -153,6 +153,9 @@ impl Checks {
         }
         if r.mass_kg.is_none() {
             let _ = truck.ask(now, Cvw::TABLE.pgn, self.table.brakes);
+        }
+        if r.reference_torque_nm.is_none() {
+            let _ = truck.ask(now, Ec1::TABLE.pgn, self.table.engine());
         }
     }
 

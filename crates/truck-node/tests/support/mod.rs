@@ -89,7 +89,13 @@ impl Files {
 
     /// Our program on a bus.
     pub fn node(&self, bus: &str, words: &[&str]) -> Process {
+        self.node_with(bus, words, &[])
+    }
+
+    /// Our program on a bus, with more in its environment.
+    pub fn node_with(&self, bus: &str, words: &[&str], environment: &[(&str, &str)]) -> Process {
         let mut command = node();
+        command.envs(environment.iter().copied());
         command.args(["--can", bus, "--map", &self.path("road.xodr")]);
         command.args(["--truck", &self.path("sheet.toml")]).args(words);
         Process::start(command)
