@@ -358,7 +358,7 @@ fn causes(
         let sentence = sentence::cause(hyp.id, hyp.size(&fit.theta, zero));
         let cause = Cause {
             id: hyp.id,
-            kind: hyp.kind,
+            kind: hyp.kind(),
             sentence,
             parameters,
             evidence: lost_nats,

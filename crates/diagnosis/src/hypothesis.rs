@@ -1,26 +1,15 @@
 //! The catalogue of causes as hypotheses: which parameters, from which starts, with which channels
 //! and how small is not worth a word.
 
+use dynamics::catalogue::{Cause, CauseKind};
+
 use crate::Channel as C;
 use crate::param::{P, Theta};
 use crate::replay::{Group, affects};
 
-/// What kind of model error a cause is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CauseKind {
-    /// A figure of an existing effect is wrong.
-    Value,
-    /// The truck does something that the model does not have.
-    MissingPhysics,
-    /// An instrument or the map is wrong, not the truck.
-    Instrument,
-}
-
 /// One hypothesis. Several may share an id: variants of shape.
 pub(crate) struct Hypothesis {
     pub(crate) id: &'static str,
-    pub(crate) kind: CauseKind,
     /// Sizes, then shapes.
     pub(crate) sizes: &'static [P],
     pub(crate) shapes: &'static [P],
@@ -42,10 +31,8 @@ const BOUND: f64 = 1e-3;
 
 const ONE: &[Start] = &[[0.0; 2]];
 
-#[expect(clippy::too_many_arguments, reason = "a row of the table below")]
 const fn h(
     id: &'static str,
-    kind: CauseKind,
     sizes: &'static [P],
     shapes: &'static [P],
     starts: &'static [Start],
@@ -53,19 +40,16 @@ const fn h(
     min_size: f64,
     sign: f64,
 ) -> Hypothesis {
-    Hypothesis { id, kind, sizes, shapes, starts, channels, min_size, sign }
+    Hypothesis { id, sizes, shapes, starts, channels, min_size, sign }
 }
-
-use CauseKind::{Instrument as I, MissingPhysics as M, Value as V};
 
 /// All hypotheses.
 pub(crate) const CATALOGUE: &[Hypothesis] = &[
-    h("rolling_resistance", V, &[P::Rolling], &[], ONE, LONG, 0.06, 0.0),
-    h("air_drag", V, &[P::Drag], &[], ONE, LONG, 0.05, 0.0),
-    h("headwind", M, &[P::Headwind], &[], ONE, LONG, 0.8, 0.0),
+    h("rolling_resistance", &[P::Rolling], &[], ONE, LONG, 0.06, 0.0),
+    h("air_drag", &[P::Drag], &[], ONE, LONG, 0.05, 0.0),
+    h("headwind", &[P::Headwind], &[], ONE, LONG, 0.8, 0.0),
     h(
         "wind",
-        M,
         &[P::WindX, P::WindY],
         &[],
         ONE,
@@ -73,21 +57,11 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         2.0,
         0.0,
     ),
-    h(
-        "mass",
-        V,
-        &[P::Mass],
-        &[P::StiffnessFollowsMass],
-        &[[0.0, 0.0], [1.0, 0.0]],
-        LONG,
-        0.02,
-        0.0,
-    ),
-    h("grade_bias", I, &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0),
-    h("map_shift", I, &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0),
+    h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0),
+    h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0),
+    h("map_shift", &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0),
     h(
         "tyre_warmup",
-        M,
         &[P::WarmupAmp],
         &[P::WarmupTau],
         &[[-0.7, 0.0], [0.0, 0.0], [0.7, 0.0]],
@@ -95,10 +69,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.1,
         1.0,
     ),
-    h("driveline_loss", V, &[P::DrivelineLoss], &[], ONE, LONG, 0.01, 0.0),
+    h("driveline_loss", &[P::DrivelineLoss], &[], ONE, LONG, 0.01, 0.0),
     h(
         "fan_load",
-        M,
         &[P::FanPower],
         &[P::FanStart, P::FanWidth],
         &[
@@ -115,11 +88,10 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         6.0,
         1.0,
     ),
-    h("dragging_brake", M, &[P::DragBrake], &[], ONE, LONG, 150.0, 1.0),
-    h("engine_friction", V, &[P::Friction], &[], ONE, LONG, 0.1, 0.0),
+    h("dragging_brake", &[P::DragBrake], &[], ONE, LONG, 150.0, 1.0),
+    h("engine_friction", &[P::Friction], &[], ONE, LONG, 0.1, 0.0),
     h(
         "altitude_derate",
-        M,
         &[P::Altitude],
         &[P::AltitudeStart],
         &[[-1200.0, 0.0], [-700.0, 0.0], [-200.0, 0.0], [300.0, 0.0], [700.0, 0.0]],
@@ -129,7 +101,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "heat_derate",
-        M,
         &[P::HeatAir],
         &[P::HeatAirStart],
         &[[-12.0, 0.0], [-6.0, 0.0], [0.0, 0.0], [4.0, 0.0]],
@@ -139,7 +110,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "heat_derate",
-        M,
         &[P::HeatCoolant],
         &[P::HeatCoolantStart],
         &[[-8.0, 0.0], [-4.0, 0.0], [0.0, 0.0], [5.0, 0.0], [9.0, 0.0]],
@@ -149,7 +119,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "turbo_lag",
-        V,
         &[P::TurboLag],
         &[P::TurboStart],
         ONE,
@@ -159,7 +128,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "pedal_delay",
-        V,
         &[P::PedalDelay],
         &[],
         ONE,
@@ -167,10 +135,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.03,
         0.0,
     ),
-    h("shift_duration", V, &[P::ShiftTime], &[], ONE, &[C::ShiftInProcess], 0.08, 0.0),
+    h("shift_duration", &[P::ShiftTime], &[], ONE, &[C::ShiftInProcess], 0.08, 0.0),
     h(
         "fuel_map_low_load",
-        V,
         &[P::FuelLow],
         &[P::FuelLowLoad, P::FuelLowOver],
         &[
@@ -190,7 +157,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "brake_gain",
-        V,
         &[P::BrakeGain],
         &[],
         ONE,
@@ -200,7 +166,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "brake_fade",
-        M,
         &[P::Fade],
         &[P::FadeStart],
         &[[-80.0, 0.0], [-40.0, 0.0], [0.0, 0.0], [60.0, 0.0]],
@@ -208,19 +173,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.05,
         1.0,
     ),
-    h(
-        "brake_delay",
-        V,
-        &[P::BrakeDelay],
-        &[],
-        ONE,
-        &[C::XbrDecelMS2, C::BrakePressureKpa],
-        0.04,
-        0.0,
-    ),
+    h("brake_delay", &[P::BrakeDelay], &[], ONE, &[C::XbrDecelMS2, C::BrakePressureKpa], 0.04, 0.0),
     h(
         "hidden_retarder",
-        M,
         &[P::RetarderStage],
         &[],
         ONE,
@@ -230,7 +185,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "hidden_retarder",
-        M,
         &[P::RetarderBrake],
         &[],
         ONE,
@@ -240,7 +194,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "hidden_retarder",
-        M,
         &[P::RetarderCoast],
         &[P::RetarderFrom],
         &[[-4.0, 0.0], [-2.0, 0.0], [0.0, 0.0], [2.0, 0.0]],
@@ -254,10 +207,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         100.0,
         1.0,
     ),
-    h("speed_scale", I, &[P::SpeedScale], &[], ONE, &[C::GpsSpeedMS], 0.004, 0.0),
+    h("speed_scale", &[P::SpeedScale], &[], ONE, &[C::GpsSpeedMS], 0.004, 0.0),
     h(
         "yaw_rate_bias",
-        I,
         &[P::YawBias],
         &[],
         ONE,
@@ -267,7 +219,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "steering_ratio",
-        V,
         &[P::SteerRatio],
         &[],
         ONE,
@@ -277,7 +228,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "steering_offset",
-        I,
         &[P::SteerOffset],
         &[],
         ONE,
@@ -287,7 +237,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "steering_free_play",
-        M,
         &[P::FreePlay],
         &[],
         ONE,
@@ -297,7 +246,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "steering_lag",
-        V,
         &[P::SteerLag],
         &[P::SteerDelay],
         &[[0.0, 0.0], [0.7, 0.0]],
@@ -307,7 +255,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "cornering_stiffness_front",
-        V,
         &[P::CFront],
         &[],
         ONE,
@@ -317,7 +264,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "cornering_stiffness_drive",
-        V,
         &[P::CDrive],
         &[],
         ONE,
@@ -327,7 +273,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "cornering_stiffness_trailer",
-        V,
         &[P::CTrailer],
         &[],
         ONE,
@@ -337,7 +282,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "payload_position",
-        V,
         &[P::PayloadX],
         &[P::StiffnessFollows],
         &[[0.0, 0.0], [1.0, 0.0]],
@@ -347,7 +291,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "road_bank",
-        M,
         &[P::Bank],
         &[],
         ONE,
@@ -357,7 +300,6 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     ),
     h(
         "engine_brake_torque",
-        V,
         &[P::EngineBrakeScale],
         &[],
         ONE,
@@ -365,13 +307,23 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.06,
         0.0,
     ),
-    h("crosswind", M, &[P::Crosswind], &[], ONE, &[C::SteeringWheelRad, C::YawRateRadS], 1.0, 0.0),
+    h("crosswind", &[P::Crosswind], &[], ONE, &[C::SteeringWheelRad, C::YawRateRadS], 1.0, 0.0),
 ];
 
 impl Hypothesis {
     /// All parameters, sizes first.
     pub(crate) fn params(&self) -> impl Iterator<Item = P> + '_ {
         self.sizes.iter().chain(self.shapes).copied()
+    }
+
+    /// The cause in the catalogue of the truck model: its kind, and the figures that carry it.
+    pub(crate) fn of_truck(&self) -> Option<&'static Cause> {
+        dynamics::catalogue::cause(self.id)
+    }
+
+    /// Kind of error.
+    pub(crate) fn kind(&self) -> CauseKind {
+        self.of_truck().map_or(CauseKind::MissingPhysics, |c| c.kind)
     }
 
     /// Groups of modules where the cause shows.
@@ -412,16 +364,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_catalogue_has_every_id_of_the_contract() {
-        let ids = "rolling_resistance air_drag headwind wind mass grade_bias map_shift tyre_warmup \
-            driveline_loss fan_load dragging_brake engine_friction altitude_derate heat_derate \
-            turbo_lag pedal_delay shift_duration fuel_map_low_load brake_gain brake_fade \
-            brake_delay hidden_retarder speed_scale yaw_rate_bias steering_ratio steering_offset \
-            steering_free_play steering_lag cornering_stiffness_front cornering_stiffness_drive \
-            cornering_stiffness_trailer payload_position road_bank crosswind \
-            engine_brake_torque";
-        for id in ids.split_whitespace() {
-            assert!(CATALOGUE.iter().any(|h| h.id == id), "{id}");
+    fn the_catalogue_is_that_of_the_truck_model() {
+        for h in CATALOGUE {
+            assert!(h.of_truck().is_some(), "{}", h.id);
+        }
+        for c in &dynamics::catalogue::CATALOGUE {
+            assert!(CATALOGUE.iter().any(|h| h.id == c.id), "{}", c.id);
         }
     }
 }

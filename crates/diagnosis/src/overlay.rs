@@ -319,6 +319,31 @@ mod tests {
         }
     }
 
+    /// The catalogue of the truck model counts in figures of the truck file, the replay in its own
+    /// terms: the prior spreads of both are the same thing.
+    #[test]
+    fn prior_spreads_are_those_of_the_truck_models_catalogue() {
+        let truck = TruckParameters::load("reference").unwrap();
+        let mut compared = 0;
+        for h in CATALOGUE {
+            for p in h.params() {
+                let spec = p.spec();
+                let value = if spec.key.ends_with("scale") { 1.0 } else { 0.0 };
+                let carry = carry(h.id, spec.key).unwrap();
+                for figure in carry.figures(&truck, value, spec.prior) {
+                    let own = h.of_truck().unwrap().parameters().find(|p| p.path == figure.path);
+                    let Some(own) = own else { continue };
+                    // The knee of low-load consumption counts from a load, not from the file.
+                    let expected = own.slope(figure.value).abs() * own.prior_sigma;
+                    let off = (figure.sigma / expected - 1.0).abs();
+                    assert!(off < 0.05, "{}: {} {expected}", figure.path, figure.sigma);
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared >= 40, "{compared}");
+    }
+
     #[test]
     fn sizes_become_figures_with_their_deviation_and_bounds() {
         let set = one(cause("rolling_resistance", &[("coefficient_scale", 1.17, 0.02)]));

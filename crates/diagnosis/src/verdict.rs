@@ -3,7 +3,7 @@
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-use crate::hypothesis::CauseKind;
+use crate::CauseKind;
 use crate::report_models::Models;
 use crate::{Detectable, Finding};
 

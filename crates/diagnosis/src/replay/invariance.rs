@@ -85,7 +85,7 @@ fn part(h: &Hypothesis, part: f64) -> (Theta, Cause) {
     }
     let cause = Cause {
         id: h.id,
-        kind: h.kind,
+        kind: h.kind(),
         sentence: String::new(),
         parameters,
         evidence: 0.0,

@@ -129,3 +129,20 @@ fn a_tolerance_that_does_the_same_takes_the_cause_away() {
     }
     assert!(found(&problem, &[ROLLING]).0.is_empty());
 }
+
+#[test]
+fn drives_held_out_confirm_a_cause_doubt_it_or_take_it_away() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let of = |count, size: f64| alike(count, &times(&columns[0].1, size), &columns);
+    let learned = of(6, 0.1);
+    let (names, fit, empty) = found(&learned, &[ROLLING]);
+    assert_eq!(names, [ROLLING]);
+    let evidence: &dyn Evidence = &learned;
+    let revised = |held: f64| {
+        let r = evidence.revise(&of(2, held), fit.clone(), &empty);
+        (r.fit.set.len(), r.opposed)
+    };
+    assert_eq!(revised(0.1), (1, false));
+    assert_eq!(revised(0.0), (1, true));
+    assert_eq!(revised(-0.2), (0, false));
+}
