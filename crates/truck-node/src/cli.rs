@@ -24,7 +24,7 @@ pub(crate) struct Args {
     /// The road: .xodr with a geo reference.
     #[arg(long, value_name = "ROAD")]
     pub(crate) map: String,
-    /// The truck's sheet, made by `sim-server truck sheet`, with its tables [bus] and [pose].
+    /// The truck's sheet, made by `sim-server truck sheet`, with its tables `bus` and `pose`.
     #[arg(long, value_name = "SHEET.toml")]
     pub(crate) truck: PathBuf,
     /// Where the truck is: bus (VP1 and VDS of a receiver on the bus) or nmea:SOURCE, a serial

@@ -261,3 +261,35 @@ impl Sheet {
         Ok(Self { limits, bus, pose })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_without_a_bus_is_the_standard_s_and_keeps_its_address() {
+        let standard = BusTruckConfig::default();
+        let config = BusTable::default().config(standard.claim_delay_steps);
+        assert!(standard.name.can_choose() && !config.name.can_choose());
+        assert_eq!(BusTruckConfig { name: standard.name, ..config }, standard);
+        assert!(BusTable::default().steering().is_none());
+    }
+
+    /// The example of docs/truck.md, commented lines included.
+    #[test]
+    fn the_example_of_the_docs_is_read() {
+        let page = include_str!("../../../docs/truck.md");
+        let example = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next());
+        let lines = example.unwrap().lines().map(|line| line.strip_prefix("# ").unwrap_or(line));
+        let tables: toml::Table = lines.collect::<Vec<_>>().join("\n").parse().unwrap();
+        let bus: BusTable = tables["bus"].clone().try_into().unwrap();
+        bus.check().unwrap();
+        let config = bus.config(0);
+        assert_eq!(config.retarders, [Some(0x0F), None, Some(0x29)]);
+        assert_eq!(config.xbr, Carrier::proprietary_xbr(0x3C));
+        assert!(config.needs_adss && bus.vin.is_some() && bus.steering().is_some());
+        let pose: LocaliserConfig = tables["pose"].clone().try_into().unwrap();
+        pose.check().unwrap();
+        assert_eq!(pose.antenna_ahead_m, 3.1);
+    }
+}
