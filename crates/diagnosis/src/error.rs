@@ -23,6 +23,20 @@ pub enum DiagnosisError {
         /// What is wrong with it.
         why: String,
     },
+    /// A log of a bus has no drive in it.
+    #[error("no drive in the log: {why}")]
+    NoDrive {
+        /// Why.
+        why: String,
+    },
+    /// A log of a bus is longer than can be held.
+    #[error("more than {samples} samples by {until_s:.0} s of the log; split it")]
+    LongLog {
+        /// Most samples.
+        samples: usize,
+        /// How far it was read, s.
+        until_s: f64,
+    },
     /// A table cannot be decoded.
     #[error("{path}: {why}")]
     Table {

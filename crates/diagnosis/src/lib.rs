@@ -32,6 +32,7 @@ pub mod experiment;
 pub mod fidelity;
 mod finding;
 pub mod fit;
+pub mod from_log;
 mod gain;
 mod gate;
 mod held_out;

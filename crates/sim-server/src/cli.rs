@@ -22,6 +22,9 @@ pub(crate) enum Command {
     Plan(Box<cmd::plan::Args>),
     /// Prints what a log of a J1939 bus says, signal by signal.
     Decode(cmd::decode::Args),
+    /// Makes measured drives of logs of a truck's bus.
+    #[command(subcommand)]
+    Drives(Box<cmd::drives::Command>),
     /// Finds what the simulation gets wrong on measured drives, and why.
     Diagnose(Box<cmd::diagnose::Args>),
     /// Plans measurements: which manoeuvres tell causes apart.

@@ -4,6 +4,7 @@
 //! recording and the viewers get its ticks over bounded channels, lossless to the recording, lossy
 //! to viewers. Only this crate knows an async runtime.
 
+mod bus_log;
 mod bus_record;
 mod cli;
 mod cmd;

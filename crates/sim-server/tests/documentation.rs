@@ -149,15 +149,16 @@ fn shortened(arguments: &[String]) -> Vec<String> {
 }
 
 /// The program's commands in blocks, in the order of their page, in one folder per page that holds
-/// `examples`.
+/// `examples` and the logs of `tests`.
 #[test]
 fn the_commands_of_the_pages_run_as_they_stand_there() {
     let no_sumo = traffic_client::sumo::Programs::find(None).err();
     let mut ran = 0;
     for page in pages() {
         let folder = tempfile::tempdir().unwrap();
-        let examples = workspace().join("examples");
-        std::os::unix::fs::symlink(examples, folder.path().join("examples")).unwrap();
+        for at in ["examples", "tests"] {
+            std::os::unix::fs::symlink(workspace().join(at), folder.path().join(at)).unwrap();
+        }
         for command in commands(&page) {
             let Some(arguments) = command.arguments() else { continue };
             let shown = command.words.join(" ");
@@ -205,7 +206,7 @@ fn every_flag_that_a_page_names_exists() {
         let is_word = |w: &&String| !w.starts_with('-') && w.chars().all(letter);
         let ours: Vec<&str> = arguments.iter().take_while(is_word).map(String::as_str).collect();
         let name = match ours.as_slice() {
-            [a @ ("map" | "scenario" | "experiment" | "truck" | "can"), b, ..] => {
+            [a @ ("map" | "scenario" | "experiment" | "truck" | "can" | "drives"), b, ..] => {
                 format!("{a} {b}")
             }
             [a, ..] => (*a).to_owned(),

@@ -12,7 +12,7 @@ use crate::output;
 use crate::progress::Stages;
 
 mod example;
-mod folder;
+pub(crate) mod folder;
 mod logger;
 mod recorded;
 mod report;

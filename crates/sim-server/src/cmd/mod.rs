@@ -3,6 +3,7 @@
 pub(crate) mod can;
 pub(crate) mod decode;
 pub(crate) mod diagnose;
+pub(crate) mod drives;
 pub(crate) mod ecu;
 pub(crate) mod experiment;
 pub(crate) mod map;
@@ -27,6 +28,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Run(args)) => run::run(&args),
         Some(Command::Plan(args)) => plan::run(&args),
         Some(Command::Decode(args)) => decode::run(&args),
+        Some(Command::Drives(command)) => drives::run(&command),
         Some(Command::Diagnose(args)) => diagnose::run(&args),
         Some(Command::Experiment(command)) => experiment::run(&command),
         Some(Command::Traffic(args)) => traffic::run(&args),

@@ -6,8 +6,9 @@ use j1939::Slot;
 use serde_json::{Map, Value, json};
 use tractrix_core::Time;
 
+use super::Format;
 use super::content::{Content, Item, Said};
-use super::{Format, Heard};
+use crate::bus_log::Heard;
 use crate::failure::Failure;
 use crate::output::Lines;
 
@@ -160,6 +161,7 @@ mod tests {
         ]);
         let heard = Heard {
             time: Time(1_500_000_000),
+            channel_number: 0,
             channel: "can0",
             id: Id::from_raw(0x18FE_CA31),
             da: 0xFF,

@@ -8,34 +8,39 @@ use crate::failure::Failure;
 use crate::out_folder::write_whole;
 
 /// Table rate of a drive, s.
-pub(super) const STEP_S: f64 = 0.05;
+pub(crate) const STEP_S: f64 = 0.05;
 
 /// One drive.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Table {
+pub(crate) struct Table {
     /// Name of the drive.
-    pub(super) name: String,
-    /// Mass on the load sheet, kg.
-    pub(super) reported_mass_kg: f64,
+    pub(crate) name: String,
+    /// Mass on the load sheet, kg; none: the truck file's.
+    pub(crate) reported_mass_kg: Option<f64>,
+    /// Whether the tyres were warm at the start; none: not known.
+    pub(crate) tyres_warm_at_start: Option<bool>,
+    /// The map table beside it.
+    pub(crate) map: Option<String>,
     /// Columns by name, of equal length; the first is `time_s`.
-    pub(super) columns: Vec<(&'static str, Vec<f64>)>,
+    pub(crate) columns: Vec<(&'static str, Vec<f64>)>,
 }
 
 impl Table {
     /// A table with these columns and no rows.
-    pub(super) fn new(name: String, columns: &[&'static str]) -> Self {
+    pub(crate) fn new(name: String, columns: &[&'static str]) -> Self {
         let columns = columns.iter().map(|c| (*c, Vec::new())).collect();
-        Self { name, reported_mass_kg: 0.0, columns }
+        Self { name, columns, tyres_warm_at_start: Some(false), ..Self::default() }
     }
 
     /// Appends a row.
-    pub(super) fn push(&mut self, row: &[f64]) {
+    pub(crate) fn push(&mut self, row: &[f64]) {
         for ((_, column), value) in self.columns.iter_mut().zip(row) {
             column.push(*value);
         }
     }
 
-    fn csv(&self) -> String {
+    /// The table as text.
+    pub(crate) fn csv(&self) -> String {
         let rows = self.columns.first().map_or(0, |c| c.1.len());
         let mut text = self.columns.iter().map(|c| c.0).collect::<Vec<_>>().join(",");
         for i in 0..rows {
@@ -65,23 +70,32 @@ struct Index<'a> {
 struct Entry {
     name: String,
     file: String,
-    reported_mass_kg: f64,
-    tyres_warm_at_start: bool,
+    map: Option<String>,
+    reported_mass_kg: Option<f64>,
+    tyres_warm_at_start: Option<bool>,
 }
 
-/// Writes a folder of drives of a truck, all started with cold tyres.
-pub(super) fn write(folder: &Path, truck: &str, tables: &[Table]) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder).map_err(|e| Failure::writing(folder, &e))?;
-    let entry = |t: &'_ Table| Entry {
+/// `drives.toml` of drives of a truck.
+///
+/// # Errors
+/// [`Failure::Work`] if it cannot be serialised.
+pub(crate) fn index(truck: &str, tables: &[Table]) -> Result<String, Failure> {
+    let entry = |t: &Table| Entry {
         name: t.name.clone(),
         file: format!("{}.csv", t.name),
+        map: t.map.clone(),
         reported_mass_kg: t.reported_mass_kg,
-        tyres_warm_at_start: false,
+        tyres_warm_at_start: t.tyres_warm_at_start,
     };
     let index = Index { schema: 1, truck, drive: tables.iter().map(entry).collect() };
+    toml::to_string(&index).map_err(Failure::work)
+}
+
+/// Writes a folder of drives of a truck.
+pub(crate) fn write(folder: &Path, truck: &str, tables: &[Table]) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| Failure::writing(folder, &e))?;
     for table in tables {
         write_whole(&folder.join(format!("{}.csv", table.name)), table.csv().as_bytes())?;
     }
-    let text = toml::to_string(&index).map_err(Failure::work)?;
-    write_whole(&folder.join("drives.toml"), text.as_bytes())
+    write_whole(&folder.join("drives.toml"), index(truck, tables)?.as_bytes())
 }

@@ -47,7 +47,7 @@ pub(super) fn drive(
     let columns: Vec<&str> =
         std::iter::once(TIME).chain(Channel::all().map(Channel::name)).collect();
     let mut table = Table::new(name, &columns);
-    table.reported_mass_kg = reported_mass_kg;
+    table.reported_mass_kg = Some(reported_mass_kg);
     let mut draw = Draw::of_seed(seed);
     let mut latest = Latest::default();
     let mut due_s = 0.0;

@@ -125,7 +125,7 @@ pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<T
         *ambient = climbed.map(|z| scenario.weather.air_at(*z).0 - ZERO_DEGC_K).collect();
     }
     let empty_kg = TruckModel::new(truck.clone(), 0.0).map_err(Failure::input)?.mass_kg();
-    table.reported_mass_kg = empty_kg + scenario.truck.payload_kg;
+    table.reported_mass_kg = Some(empty_kg + scenario.truck.payload_kg);
     Ok(table)
 }
 

@@ -1,0 +1,86 @@
+//! `drives from-can`: logs of real trucks into measured drives, and logs that hold none.
+#![allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "helpers of tests")]
+
+mod support;
+
+use std::path::Path;
+
+use serde_json::Value;
+use support::{refused, server};
+
+const LOGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/data/j1939");
+
+fn log(name: &str) -> String {
+    format!("{LOGS}/{name}.log.gz")
+}
+
+#[test]
+fn half_a_minute_of_a_real_truck_becomes_a_drive_that_says_where_it_is_from() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("drives").display().to_string();
+    let log = log("t270_normal");
+    let command = ["drives", "from-can", &log, "--truck", "reference", "--min-drive-s", "20"];
+    let output = server(&[&command[..], &["--out", &out]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| std::fs::read_to_string(Path::new(&out).join(name)).unwrap();
+    let report: Value = serde_json::from_str(&read("conversion.json")).unwrap();
+    let of_log = &report["logs"][0];
+    let columns = of_log["columns"].as_array().unwrap();
+    let speed = columns.iter().find(|c| c["column"] == "speed_m_s").unwrap();
+    // the front axle has finer steps than the cab's speed, which is named beside it
+    assert_eq!(
+        (&speed["signal"], &speed["address"]),
+        (&"EBC2.front_axle_speed".into(), &11.into())
+    );
+    assert_eq!(speed["others"][0], "CCVS1.speed of 00 on channel 0");
+    let missing = of_log["missing"].as_array().unwrap();
+    assert!(missing.iter().any(|m| m["why"] == "nobody sends VDC2.yaw_rate"));
+    let table = read("t270_normal_1.csv");
+    let mut lines = table.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let at = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let rows: Vec<Vec<f64>> =
+        lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    assert!(rows.len() > 550, "{} rows", rows.len());
+    let speeds = rows.iter().map(|r| r[at("speed_m_s")]);
+    let (least, most) = speeds.fold((f64::MAX, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+    // the README of the log: 23 to 55 km/h, gears 2 to 4
+    assert!((5.0..8.0).contains(&least) && (14.0..16.0).contains(&most), "{least} {most}");
+    assert!(rows.iter().all(|r| (2.0..=4.0).contains(&r[at("gear")]) || r[at("gear")].is_nan()));
+    let index = read("drives.toml");
+    assert!(index.contains("truck = \"reference\"") && !index.contains("reported_mass_kg"));
+    let line = refused(&[&command[..], &["--out", &out]].concat());
+    assert!(line.contains("--overwrite"), "{line}");
+}
+
+#[test]
+fn a_log_without_a_drive_gets_one_line_that_says_why_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("drives");
+    let at = out.display().to_string();
+    let empty = folder.path().join("empty.log");
+    std::fs::write(&empty, "").unwrap();
+    let binary = folder.path().join("binary.log");
+    std::fs::write(&binary, [0u8, 255, 3, 200, 10, 7]).unwrap();
+    let (empty, binary) = (empty.display().to_string(), binary.display().to_string());
+    let (idle, parked, drives) =
+        (log("css_truck_idle"), log("uthp_modern_parked"), log("t270_normal"));
+    let cases: [(&[&str], &str); 8] = [
+        (&[&idle], "the truck stands for all of 127 s"),
+        (&[&parked], "error or not available in all of"),
+        (&[&drives], "30 s of driving, shorter than 60 s"),
+        (&[&empty], "nobody sends HRW rear wheels or EBC2"),
+        (&[&binary], "binary.log"),
+        (&["nowhere.log"], "nowhere.log"),
+        (&[&drives, &drives], "two logs are named t270_normal"),
+        (&[&drives, "--map", "builtin:flat"], "does not say where on earth it lies"),
+    ];
+    for (arguments, named) in cases {
+        let command = ["drives", "from-can", "--truck", "reference", "--out", &at];
+        let line = refused(&[&command[..], arguments].concat());
+        assert!(line.contains(named), "{line}");
+        assert!(!out.exists(), "{arguments:?} left something behind");
+    }
+    let line = refused(&["drives", "from-can", &drives, "--truck", "nosuch", "--out", &at]);
+    assert!(line.contains("nosuch"), "{line}");
+}
