@@ -22,15 +22,21 @@ struct Case {
     plan: FaultPlan,
     broken: Option<EcuFault>,
     attack: Option<Attack>,
+    /// The driver's clock jumps, ns.
+    jump_ns: i64,
 }
 
 impl Case {
     const fn of_plan(name: &'static str, plan: FaultPlan) -> Self {
-        Self { name, plan, broken: None, attack: None }
+        Self { name, plan, broken: None, attack: None, jump_ns: 0 }
     }
 
     fn broken(name: &'static str, fault: EcuFault) -> Self {
         Self { broken: Some(fault), ..Self::of_plan(name, FaultPlan::default()) }
+    }
+
+    fn jump(name: &'static str, jump_ns: i64) -> Self {
+        Self { jump_ns, ..Self::of_plan(name, FaultPlan::default()) }
     }
 
     fn attack(name: &'static str, attack: Attack) -> Self {
@@ -80,6 +86,8 @@ fn cases() -> Vec<Case> {
             Ok(())
         }),
         Case::broken("frozen wheel speeds", EcuFault::FrozenWheels),
+        Case::jump("clock jumps 1 s ahead", 1_000_000_000),
+        Case::jump("clock jumps 1 s back", -1_000_000_000),
     ]
 }
 
@@ -109,6 +117,9 @@ fn drive(scenario: &Scenario, case: &Case) -> Result<(), SimError> {
         if now.seconds() >= FROM_S {
             if let (0, Some(fault), Some(bus)) = (ticks, case.broken, world.bus_mut()) {
                 bus.ecu().break_down(fault);
+            }
+            if let (0, Some(bus)) = (ticks, world.bus_mut()) {
+                bus.jump_clock(case.jump_ns);
             }
             if let Some(attack) = case.attack {
                 // A full send queue is the attacker's affair

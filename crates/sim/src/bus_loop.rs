@@ -50,6 +50,8 @@ pub fn bus_driver_setup() -> String {
 pub struct End {
     way: Way,
     sent: BusLoad,
+    /// How far this end's clock is ahead of the bus's, ns.
+    ahead_ns: i64,
 }
 
 enum Way {
@@ -60,13 +62,13 @@ enum Way {
 
 impl End {
     fn new(way: Way, rate: BitRate) -> Self {
-        Self { way, sent: BusLoad::new(rate) }
+        Self { way, sent: BusLoad::new(rate), ahead_ns: 0 }
     }
 }
 
 impl Clone for End {
     fn clone(&self) -> Self {
-        Self { way: Way::CutOff, sent: self.sent }
+        Self { way: Way::CutOff, sent: self.sent, ahead_ns: self.ahead_ns }
     }
 }
 
@@ -82,6 +84,7 @@ impl std::fmt::Debug for End {
 
 impl Bus for End {
     fn send(&mut self, now: Time, frame: &Frame) -> Result<(), BusError> {
+        let now = now.plus_nanos(-self.ahead_ns);
         match &mut self.way {
             Way::Loopback(node) => node.send(now, frame)?,
             Way::Given(bus) => bus.send(now, frame)?,
@@ -92,11 +95,13 @@ impl Bus for End {
     }
 
     fn receive(&mut self, now: Time) -> Result<Option<Stamped<Frame>>, BusError> {
-        match &mut self.way {
-            Way::Loopback(node) => node.receive(now),
-            Way::Given(bus) => bus.receive(now),
-            Way::CutOff => Err(BusError::Off),
-        }
+        let now = now.plus_nanos(-self.ahead_ns);
+        let heard = match &mut self.way {
+            Way::Loopback(node) => node.receive(now)?,
+            Way::Given(bus) => bus.receive(now)?,
+            Way::CutOff => return Err(BusError::Off),
+        };
+        Ok(heard.map(|heard| Stamped { time: heard.time.plus_nanos(self.ahead_ns), ..heard }))
     }
 }
 
@@ -108,6 +113,8 @@ pub struct BusLoop {
     ecu: EcuSim<End>,
     driver: BusTruck<End, PlantPose, ExampleSteering>,
     figures: BusFigures,
+    /// How far the driver's clock is ahead, ns.
+    ahead_ns: i64,
 }
 
 /// How the bus did so far.
@@ -166,7 +173,7 @@ impl BusLoop {
         let ecu = EcuSim::new(truck, ecu, config, start, Some(Time::ZERO))?;
         let pose = PlantPose::new(PoseNoise::default(), 0, ecu.ego());
         let driver = bus_driver(driver, rate, pose, limits)?;
-        let mut looped = Self { wire, ecu, driver, figures: BusFigures::default() };
+        let mut looped = Self { wire, ecu, driver, figures: BusFigures::default(), ahead_ns: 0 };
         looped.warm_up(start)?;
         Ok(looped)
     }
@@ -194,8 +201,16 @@ impl BusLoop {
 
     fn exchange(&mut self, now: Time) -> Result<Stamped<EgoState>, SimError> {
         let truth = self.ecu.advance(now)?;
-        self.driver.pose_source().feed(&Stamped { time: now, ..truth });
-        self.driver.ego(now).map_err(drive_error)
+        let driver_now = now.plus_nanos(self.ahead_ns);
+        self.driver.pose_source().feed(&Stamped { time: driver_now, ..truth });
+        let ego = self.driver.ego(driver_now).map_err(drive_error)?;
+        Ok(Stamped { time: ego.time.plus_nanos(-self.ahead_ns), ..ego })
+    }
+
+    /// Sets the driver's clock so far ahead, or back, ns: times in its status are its own.
+    pub const fn jump_clock(&mut self, by_ns: i64) {
+        self.ahead_ns = self.ahead_ns.saturating_add(by_ns);
+        self.driver.bus().ahead_ns = self.ahead_ns;
     }
 
     /// A copy that goes on bit for bit like this one; none on a bus outside of this process, of
@@ -204,7 +219,8 @@ impl BusLoop {
     pub fn fork(&self) -> Option<Self> {
         let wire = self.wire.as_ref()?.fork();
         let (ecu, driver) = (self.ecu.clone(), self.driver.clone());
-        let mut fork = Self { wire: None, ecu, driver, figures: self.figures };
+        let (figures, ahead_ns) = (self.figures, self.ahead_ns);
+        let mut fork = Self { wire: None, ecu, driver, figures, ahead_ns };
         fork.ecu.bus().way = Way::Loopback(wire.node(ECU_NODE));
         fork.driver.bus().way = Way::Loopback(wire.node(DRIVER_NODE));
         fork.wire = Some(wire);
@@ -264,7 +280,7 @@ impl Vehicle for BusLoop {
     }
 
     fn command(&mut self, now: Time, command: &Command) -> Result<(), SimError> {
-        self.driver.command(now, command).map_err(drive_error)
+        self.driver.command(now.plus_nanos(self.ahead_ns), command).map_err(drive_error)
     }
 
     fn limits(&self) -> &VehicleLimits {
