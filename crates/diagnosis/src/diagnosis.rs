@@ -172,7 +172,7 @@ pub fn diagnose_with(
         }
         None => fit,
     };
-    let mut causes = causes(&problem, &fit, &empty, &open, most);
+    let mut causes = causes(&problem, &fit, &empty, &open);
     let weak = |c: &(Cause, bool)| c.1 && c.0.evidence < MIN_EVIDENCE;
     let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);
     let fit = if faint { empty } else { fit };
@@ -284,21 +284,14 @@ fn observable(
     (open, not, detectable)
 }
 
-/// The causes of a fit with sizes, rivals and probabilities, and whether a rival says as much. `bare`
-/// is the evidence of the best free function without causes.
-fn causes(
-    problem: &Problem<'_>,
-    fit: &Fit,
-    empty: &Fit,
-    open: &[usize],
-    bare: f64,
-) -> Vec<(Cause, bool)> {
+/// The causes of a fit with sizes, rivals and probabilities, and whether a rival says as much. Free
+/// functions were judged before.
+fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<(Cause, bool)> {
     let (evidence, zero) = (problem.evidence(), &problem.reference.theta);
     let variances = evidence.variances(fit);
     let ids = |set: &[usize]| set.iter().map(|h| CATALOGUE[*h].id).collect::<Vec<_>>();
     let model = |causes, log_z| Weighed { causes, function: false, log_z };
     let mut models = vec![model(ids(&fit.set), fit.log_z), model(Vec::new(), 0.0)];
-    models.push(Weighed { function: true, ..model(Vec::new(), bare) });
     let mut out = Vec::new();
     for (i, h) in fit.set.iter().enumerate() {
         let hyp = &CATALOGUE[*h];

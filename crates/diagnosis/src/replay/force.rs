@@ -23,8 +23,8 @@ pub(super) const EDGE: usize = 4;
 
 /// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
 pub(crate) const RETARDER_POWER_W: f64 = 400_000.0;
-/// Lag of such a retarder, s: as fast as an engine brake, for nobody knows what it is.
-pub(crate) const RETARDER_LAG_S: f64 = 0.2;
+/// Lag of such a retarder, s: at once, for nobody knows what it is.
+pub(crate) const RETARDER_LAG_S: f64 = 0.005;
 
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[super::Module::Force as usize];
