@@ -310,6 +310,20 @@ fn pedals_and_wheel_give_the_truck_to_the_driver_until_it_is_engaged_again() {
 }
 
 #[test]
+fn a_single_wrong_message_is_no_foot() {
+    // The story: one corrupted EEC2 looked like the driver's foot, and the truck was given to a driver
+    // who was not there.
+    let mut yard = Yard::engaged();
+    yard.controllers.measured.accelerator_frac = 0.2;
+    yard.controllers.measured.brake_pedal_frac = 0.2;
+    yard.run(0.1);
+    yard.controllers.measured = support::Measured::default();
+    yard.run(0.5);
+    assert_eq!(yard.truck.engagement(), Engagement::Engaged);
+    assert!(yard.truck.status().since(VehicleFault::DriverOverride).is_none());
+}
+
+#[test]
 fn brakes_that_take_no_demand_are_not_relied_on() {
     for state in [1, 2] {
         let mut yard = Yard::engaged();

@@ -82,6 +82,7 @@ pub struct BusTruck<B, P, S = ExampleSteering> {
     pose_told: [Option<Time>; 2],
     commanded: Command,
     wheel_off: Option<Time>,
+    pedal_down: Option<Time>,
     contradicted: Option<Time>,
     fuel_used_g: f64,
     fuel_until: Option<Time>,
@@ -122,6 +123,7 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
             pose_told: [None; 2],
             commanded: Command::default(),
             wheel_off: None,
+            pedal_down: None,
             contradicted: None,
             fuel_used_g: 0.0,
             fuel_until: None,
@@ -291,16 +293,18 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
     fn driver_acts(&mut self, now: Time) -> bool {
         let c = &self.config;
         let beyond = |field: Option<Stamped<f64>>, frac| field.is_some_and(|f| f.value > frac);
-        let pedals = beyond(self.heard.accelerator_frac, c.driver_accelerator_frac)
+        let pedal = beyond(self.heard.accelerator_frac, c.driver_accelerator_frac)
             || beyond(self.heard.brake_pedal_frac, c.driver_brake_frac)
             || self.heard.brake_pedal_pressed;
         let asked = self.steering.is_some() && self.clutch.state().actuates();
         let off = self.heard.steering_wheel_rad.is_some_and(|wheel| {
             (wheel.value - self.commanded.steering_wheel_rad).abs() > c.driver_wheel_rad
         });
-        self.wheel_off = if asked && off { Some(self.wheel_off.unwrap_or(now)) } else { None };
-        let held = |since| now.seconds_since(since) >= c.driver_wheel_s;
-        pedals || self.wheel_off.is_some_and(held)
+        let since = |acts: bool, before: Option<Time>| acts.then(|| before.unwrap_or(now));
+        self.pedal_down = since(pedal, self.pedal_down);
+        self.wheel_off = since(asked && off, self.wheel_off);
+        let held = |since: Option<Time>, s| since.is_some_and(|t| now.seconds_since(t) >= s);
+        held(self.pedal_down, c.driver_pedal_s) || held(self.wheel_off, c.driver_wheel_s)
     }
 
     /// Whether engine and brakes take demands: state 1 takes those of the first priority alone,

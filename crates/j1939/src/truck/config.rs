@@ -42,6 +42,9 @@ pub struct BusTruckConfig {
     pub driver_accelerator_frac: f64,
     /// Brake pedal from which on the driver has taken over, 0 to 1.
     pub driver_brake_frac: f64,
+    /// A pedal has to be there for so long, s: longer than two messages of the slowest sender, as a
+    /// single wrong one is no foot.
+    pub driver_pedal_s: f64,
     /// A hand wheel this far from what was asked is held by the driver, rad.
     pub driver_wheel_rad: f64,
     /// It has to be there for so long, s.
@@ -73,6 +76,7 @@ impl Default for BusTruckConfig {
             driver_accelerator_frac: 0.05,
             driver_brake_frac: 0.03,
             driver_wheel_rad: 0.6,
+            driver_pedal_s: 0.25,
             driver_wheel_s: 0.3,
             wheel_rate_max_rad_s: 12.0,
             acceleration_filter_s: 0.1,
