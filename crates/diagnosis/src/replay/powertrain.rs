@@ -7,7 +7,6 @@ use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
-use super::smooth;
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -127,9 +126,6 @@ pub(crate) const LOW_LOAD_FRAC: f64 = 0.3;
 /// Engine speed at which a load is a power, rpm: where highway trucks cruise.
 pub(crate) const CRUISE_RPM: f64 = 1_250.0;
 
-/// Samples over which a fuel rate is steady enough to be scaled: a second.
-const STEADY: usize = 21;
-
 /// Fuel rate, over its noise scale (a constant part and one percent of the rate).
 pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Fuel as usize];
@@ -144,9 +140,6 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let rate = d.profiles.get(Kind::Willans, [lag], || {
         (0..d.n).map(|i| plant.engine.fuel_rate_g_s(omega(i), torque(i))).collect()
     });
-    // A scale that multiplied the torque message's noise would be fitted to damp that noise, with a
-    // free function to make up for its level.
-    let steady = d.profiles.get(Kind::SteadyRate, [lag], || smooth::running_mean(&rate, STEADY));
     // What is low: torque over the full load at this speed, power, or torque, these two over full
     // load at cruise.
     let over = t[P::FuelLowOver as usize];
@@ -176,7 +169,7 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
             for i in 4 * k..4 * k + 4 {
                 let extra = low * (1.0 - load[i] * per_load).max(0.0);
                 measured += 0.25 * d.fuel[i];
-                modelled += 0.25 * (rate[i] * (1.0 + extra) + steady[i] * (scale - 1.0));
+                modelled += 0.25 * rate[i] * scale * (1.0 + extra);
             }
             (measured - modelled) / (d.fuel_noise_g_s[k] * calmed)
         })

@@ -21,8 +21,6 @@ pub(super) enum Kind {
     Grade,
     /// Fuel rate of the map and load; over the lag.
     Willans,
-    /// Fuel rate of the map without the noise of the torque message; over the lag.
-    SteadyRate,
     /// Torque over full load, or what else may be low; over the lag and the choice.
     Load,
     /// Pedal after its dead time.
