@@ -307,7 +307,7 @@ def test_a_killed_run_is_recovered_with_schemas_attachments_and_metadata(
     recovered = tmp_path / "run.recovered.mcap"
     assert (
         report["was_torn"]
-        and report["attachments"] == 1
+        and report["attachments"] == 2
         and report["metadata_records"] == 1
     )
     found = messages(recovered)
@@ -317,5 +317,6 @@ def test_a_killed_run_is_recovered_with_schemas_attachments_and_metadata(
     assert steps == {10_000_000}, "no tick is missing before the tear"
     with recovered.open("rb") as file:
         reader = make_reader(file)
-        assert [a.name for a in reader.iter_attachments()] == ["scenario.toml"]
+        attached = [a.name for a in reader.iter_attachments()]
+        assert attached == ["scenario.toml", "stack.toml"]
         assert [m.name for m in reader.iter_metadata()] == ["run"]

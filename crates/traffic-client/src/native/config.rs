@@ -202,7 +202,7 @@ impl Default for TrafficConfig {
             ego_clearance_m: 50.0,
             scene_radius_m: 300.0,
             sees_ego: true,
-            trucks_keep_out_of_left_lane: true,
+            trucks_keep_out_of_left_lane: false,
             mandatory_ahead_m: 800.0,
             yield_decel_m_s2: 1.5,
             inflow_speed_m_s: None,
