@@ -70,8 +70,7 @@ fn a_drive_over_a_bus_is_the_drive_that_it_is_directly() {
 #[test]
 #[ignore = "needs CAN sockets: tests/can/uml.sh"]
 fn a_drive_over_two_can_sockets_is_the_drive_that_it_is_directly() {
-    // where no decision hangs on a millimetre (docs/results/truck.md)
-    for name in ["test-site", "sparse-12.5"] {
+    for name in ["test-site", "medium-12.5"] {
         is_the_drive_that_it_is_directly(name, |world| {
             let open = || j1939::bus::open("can:vcan0").unwrap();
             let [ecu, driver] = sim::in_step(open(), open());
