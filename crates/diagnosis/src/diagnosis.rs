@@ -290,7 +290,7 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
     let (evidence, zero) = (problem.evidence(), &problem.reference.theta);
     let variances = evidence.variances(fit);
     let ids = |set: &[usize]| set.iter().map(|h| CATALOGUE[*h].id).collect::<Vec<_>>();
-    let model = |causes, log_z| Weighed { causes, function: false, log_z };
+    let model = |causes, log_z| Weighed { causes, log_z };
     let mut models = vec![model(ids(&fit.set), fit.log_z), model(Vec::new(), 0.0)];
     let mut out = Vec::new();
     for (i, h) in fit.set.iter().enumerate() {

@@ -1,23 +1,19 @@
 //! How probable an explanation is: posterior weights of the models that were compared.
 //!
 //! ```text
-//! weight(M) ~ exp(log Z(M) + log p(M))     log p(M) = k ln(pi/(1-pi)) + f ln(pi_f/(1-pi_f))
+//! weight(M) ~ exp(log Z(M) + log p(M))     log p(M) = k ln(pi/(1-pi))
 //! ```
-//! `k` causes, `f` free functions (MacKay, Neural Computation 4, 1992). A cause's probability is the
-//! share of the models that hold it: the set that was found, the sets with one of its causes left out
-//! or replaced by another one, none at all, and a free function instead of all. Evidence of a cause
-//! beside a large one counts for less, by as much as the search asks more of it: what it adds may be
-//! the form of the large one.
+//! `k` causes (MacKay, Neural Computation 4, 1992). A cause's probability is the share of the models
+//! that hold it: the set that was found, the sets with one of its causes left out or replaced by
+//! another one, and none at all. Evidence of a cause beside a large one counts for less, by as much as
+//! the search asks more of it: what it adds may be the form of the large one.
 //!
-//! Left out: what neither the catalogue nor a free function has. A set that may stand in for such a
+//! Left out: free functions, and what the catalogue does not have. A set that may stand in for such a
 //! thing is called ambiguous whatever its weight.
 
 /// Probability that a cause of the catalogue is there before any drive is seen: with 35 causes, one
 /// truck in six has one.
 pub(crate) const PRIOR_CAUSE: f64 = 0.005;
-/// The same of one free function: one truck in ten does something that the catalogue lacks, in one of
-/// two hundred pairs of a signal and a module.
-pub(crate) const PRIOR_FUNCTION: f64 = 0.0005;
 
 /// Log odds of a prior probability.
 fn log_odds(p: f64) -> f64 {
@@ -29,8 +25,6 @@ fn log_odds(p: f64) -> f64 {
 pub(crate) struct Weighed {
     /// Ids of its causes.
     pub(crate) causes: Vec<&'static str>,
-    /// It holds a free function.
-    pub(crate) function: bool,
     /// Log evidence, nats, from whatever level is common to all.
     pub(crate) log_z: f64,
 }
@@ -38,15 +32,10 @@ pub(crate) struct Weighed {
 /// Weights of models, in their order; they add up to one. The same set under two shapes counts once,
 /// by its better one.
 pub(crate) fn weights(models: &[Weighed]) -> Vec<f64> {
-    let score = |m: &Weighed| {
-        let functions = if m.function { log_odds(PRIOR_FUNCTION) } else { 0.0 };
-        m.log_z + m.causes.len() as f64 * log_odds(PRIOR_CAUSE) + functions
-    };
+    let score = |m: &Weighed| m.log_z + m.causes.len() as f64 * log_odds(PRIOR_CAUSE);
     let scores: Vec<f64> = models.iter().map(score).collect();
     let same = |a: &Weighed, b: &Weighed| {
-        a.function == b.function
-            && a.causes.len() == b.causes.len()
-            && a.causes.iter().all(|c| b.causes.contains(c))
+        a.causes.len() == b.causes.len() && a.causes.iter().all(|c| b.causes.contains(c))
     };
     let best = |i: usize| {
         models
@@ -79,7 +68,7 @@ mod tests {
     use super::*;
 
     fn model(causes: &[&'static str], log_z: f64) -> Weighed {
-        Weighed { causes: causes.to_vec(), function: false, log_z }
+        Weighed { causes: causes.to_vec(), log_z }
     }
 
     fn of(models: &[Weighed], id: &str) -> f64 {
@@ -114,11 +103,5 @@ mod tests {
         ];
         assert!((of(&models, "a") - 0.5).abs() < 1e-9, "{:?}", weights(&models));
         assert!((weights(&models).iter().sum::<f64>() - 1.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn a_free_function_that_explains_more_leaves_little_to_the_cause() {
-        let free = Weighed { causes: Vec::new(), function: true, log_z: 60.0 };
-        assert!(of(&[model(&[], 0.0), model(&["a"], 40.0), free], "a") < 1e-6);
     }
 }

@@ -71,7 +71,7 @@ pub use metrics::{Metrics, Summary};
 pub use off_road::OffRoad;
 pub use overrides::Overrides;
 pub use plant::{Plant, Simulated};
-pub use plant_pose::{PlantPose, PoseNoise};
+pub use plant_pose::{PlantPose, PoseNoise, pose_of};
 pub use run_report::{EndReason, RunReport, WallClock};
 pub use scenario::{EgoStart, RunLimits, Scenario, TruckSection, Weather};
 pub use sim_truck::SimTruck;

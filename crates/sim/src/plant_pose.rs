@@ -97,7 +97,9 @@ impl PoseSource for PlantPose {
     }
 }
 
-fn pose_of(ego: &EgoState) -> Pose {
+/// The pose that an ego state holds.
+#[must_use]
+pub fn pose_of(ego: &EgoState) -> Pose {
     Pose {
         x_m: ego.x_m,
         y_m: ego.y_m,

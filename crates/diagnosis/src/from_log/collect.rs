@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use j1939::{Id, MessageTable};
+use j1939::message::{Tsc1, Xbr};
+use j1939::{Id, Message, MessageTable};
 use tractrix_core::Time;
 
 use super::signals::{CANDIDATES, What};
@@ -103,7 +104,7 @@ impl Log {
                 continue;
             }
             // requests go to somebody, all else comes from somebody
-            let is_request = table.pgn == REQUESTS[0] || table.pgn == REQUESTS[1];
+            let is_request = REQUESTS.contains(&table.pgn);
             let address = if is_request { id.da() } else { id.sa() };
             if !c.only.is_empty() && !c.only.contains(&address) {
                 continue;
@@ -139,8 +140,8 @@ impl Log {
     }
 }
 
-/// TSC1 and XBR.
-const REQUESTS: [u32; 2] = [0, 1024];
+/// Groups that ask somebody for something.
+const REQUESTS: [u32; 2] = [Tsc1::TABLE.pgn, Xbr::TABLE.pgn];
 
 pub(super) fn candidate_is(candidate: usize, what: What) -> bool {
     CANDIDATES.get(candidate).is_some_and(|c| c.what == what)

@@ -27,12 +27,12 @@ pub use collect::Log;
 pub use place::Locate;
 pub use trips::Span;
 
-use crate::{Channel, DiagnosisError};
+use crate::{Channel, DiagnosisError, Drive};
 use choose::{Chosen, choose, why_not};
 use signals::What;
 
-/// Step of the tables, s.
-const STEP_S: f64 = 0.05;
+/// Step of the tables, s: that of the diagnosis.
+const STEP_S: f64 = Drive::STEP_S;
 /// Rows between two altitudes that the grade is made of.
 const GRADE_ROWS: usize = 20;
 

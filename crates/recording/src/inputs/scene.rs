@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 
 use tractrix_core::{Neighbour, VehicleClass};
 
+use crate::ros::truck::class_code;
+
 /// Numbers of a vehicle.
 const NUMBERS: usize = 10;
 /// Vehicles of a scene: more in a file is nonsense.
@@ -156,15 +158,18 @@ fn numbers_of(n: &Neighbour) -> [f64; NUMBERS] {
     ]
 }
 
+/// Every class there is.
+const CLASSES: [VehicleClass; 5] = [
+    VehicleClass::Car,
+    VehicleClass::Van,
+    VehicleClass::Truck,
+    VehicleClass::Emergency,
+    VehicleClass::Barrier,
+];
+
 /// Class and lane; the lane to which it changes, from 1, 0 for none.
 fn words_of(n: &Neighbour) -> [u64; 2] {
-    let class = match n.class {
-        VehicleClass::Car => 0,
-        VehicleClass::Van => 1,
-        VehicleClass::Truck => 2,
-        VehicleClass::Emergency => 3,
-        VehicleClass::Barrier => 4,
-    };
+    let class = u64::from(class_code(n.class));
     [class << 16 | u64::from(n.lane), n.target_lane.map_or(0, |lane| u64::from(lane) + 1)]
 }
 
@@ -181,14 +186,7 @@ fn neighbour(id: u64, [of_lane, target]: [u64; 2], numbers: [f64; NUMBERS]) -> O
         y_m,
         yaw_rad,
     ] = numbers;
-    let class = match of_lane >> 16 {
-        0 => VehicleClass::Car,
-        1 => VehicleClass::Van,
-        2 => VehicleClass::Truck,
-        3 => VehicleClass::Emergency,
-        4 => VehicleClass::Barrier,
-        _ => return None,
-    };
+    let class = CLASSES.into_iter().find(|class| u64::from(class_code(*class)) == of_lane >> 16)?;
     let target_lane = match target.checked_sub(1) {
         Some(lane) => Some(u16::try_from(lane).ok()?),
         None => None,

@@ -171,17 +171,22 @@ pub(crate) struct SceneVehicle {
     lane: u16,
 }
 
+/// The number of a class in every message.
+pub(crate) const fn class_code(class: VehicleClass) -> u8 {
+    match class {
+        VehicleClass::Car => 0,
+        VehicleClass::Van => 1,
+        VehicleClass::Truck => 2,
+        VehicleClass::Emergency => 3,
+        VehicleClass::Barrier => 4,
+    }
+}
+
 impl From<&Neighbour> for SceneVehicle {
     fn from(n: &Neighbour) -> Self {
         Self {
             id: n.id,
-            vehicle_class: match n.class {
-                VehicleClass::Car => 0,
-                VehicleClass::Van => 1,
-                VehicleClass::Truck => 2,
-                VehicleClass::Emergency => 3,
-                VehicleClass::Barrier => 4,
-            },
+            vehicle_class: class_code(n.class),
             front_s_m: n.front_s_m,
             rear_s_m: n.rear_s_m,
             d_m: n.d_m,

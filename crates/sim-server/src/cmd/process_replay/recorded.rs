@@ -58,20 +58,7 @@ pub(super) struct RecordedPose(pub(super) Option<Stamped<Pose>>);
 
 impl RecordedPose {
     pub(super) fn of(step: &GivenStep) -> Self {
-        Self(step.ego.map(|Stamped { time, value: e }| Stamped {
-            time,
-            value: Pose {
-                x_m: e.x_m,
-                y_m: e.y_m,
-                z_m: e.z_m,
-                yaw_rad: e.yaw_rad,
-                s_m: e.s_m,
-                d_m: e.d_m,
-                lateral_speed_m_s: e.lateral_speed_m_s,
-                articulation_rad: e.trailer.articulation_rad,
-                trailer_yaw_rate_rad_s: e.trailer.yaw_rate_rad_s,
-            },
-        }))
+        Self(step.ego.map(|Stamped { time, value }| Stamped { time, value: sim::pose_of(&value) }))
     }
 }
 
