@@ -203,6 +203,25 @@ fn a_controller_that_is_off_the_bus_is_noticed_at_once() {
 }
 
 #[test]
+fn a_clock_that_jumps_is_noticed_at_once_and_driven_on_with() {
+    for by_ns in [1_000 * MS, -1_000 * MS] {
+        let (mut world, _) = with_faults(FaultPlan::default());
+        let mut jumped = false;
+        let (fault, after_s) = detected_after_s(&mut world, |world| {
+            if !std::mem::replace(&mut jumped, true) {
+                world.bus_mut().unwrap().jump_clock(by_ns);
+            }
+        });
+        assert_eq!((fault, after_s), (VehicleFault::SignalLost, 0.0), "{by_ns}");
+        let summary = world.run(&mut ()).unwrap();
+        assert_eq!(summary.collisions, 0);
+        let looped = world.bus_mut().unwrap();
+        assert_eq!(looped.driver().engagement(), Engagement::Engaged, "{by_ns}");
+        assert!(looped.figures().ticks_not_driven < 100, "{:?}", looped.figures());
+    }
+}
+
+#[test]
 fn a_lost_frame_in_a_hundred_changes_nothing() {
     let plan = FaultPlan { from: FROM, loss: 0.01, ..FaultPlan::default() };
     let (mut world, _) = with_faults(plan);
