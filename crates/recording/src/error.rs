@@ -39,6 +39,12 @@ pub enum RecordingError {
         /// Why.
         why: String,
     },
+    /// The disk did not take the end of the recording in time.
+    #[error("the disk takes nothing: given up after {after_s:.0} s")]
+    Stuck {
+        /// How long it was waited for, s.
+        after_s: f64,
+    },
     /// The writer's thread ended without a result.
     #[error("the recording thread panicked")]
     Panicked,

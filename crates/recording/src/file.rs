@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata};
@@ -44,10 +44,27 @@ struct Channel {
     sequence: u32,
 }
 
+/// What a recording is written to.
+pub(crate) trait Disk: Write + Seek + Send {
+    /// Returns when everything is on the disk.
+    fn sync(&mut self) -> std::io::Result<()>;
+}
+
+impl Disk for BufWriter<File> {
+    fn sync(&mut self) -> std::io::Result<()> {
+        self.flush()?;
+        match self.get_ref().sync_all() {
+            // A pipe or device has nothing to sync.
+            Err(e) if e.kind() != std::io::ErrorKind::InvalidInput => Err(e),
+            _ => Ok(()),
+        }
+    }
+}
+
 /// An MCAP file under construction.
 pub(crate) struct McapFile {
     path: PathBuf,
-    writer: Writer<BufWriter<File>>,
+    writer: Writer<Box<dyn Disk>>,
     channels: BTreeMap<&'static str, Channel>,
 }
 
@@ -55,9 +72,12 @@ impl McapFile {
     /// Creates the file; it must be possible to write there.
     pub(crate) fn create(path: &Path) -> Result<Self, RecordingError> {
         let file = File::create(path).map_err(|e| RecordingError::write(path, e))?;
-        let writer = write_options()
-            .create(BufWriter::new(file))
-            .map_err(|e| RecordingError::write(path, e))?;
+        Self::on(path, Box::new(BufWriter::new(file)))
+    }
+
+    /// The file on a disk.
+    pub(crate) fn on(path: &Path, disk: Box<dyn Disk>) -> Result<Self, RecordingError> {
+        let writer = write_options().create(disk).map_err(|e| RecordingError::write(path, e))?;
         Ok(Self { path: path.to_owned(), writer, channels: BTreeMap::new() })
     }
 
@@ -139,15 +159,7 @@ impl McapFile {
     /// Writes the summary section; the file is whole after it.
     pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
         self.writer.finish().map_err(|e| RecordingError::write(&self.path, e))?;
-        let file = self.writer.into_inner().into_inner();
-        let file = file.map_err(|e| RecordingError::write(&self.path, e.into_error()))?;
-        match file.sync_all() {
-            // A pipe or device has nothing to sync.
-            Err(e) if e.kind() != std::io::ErrorKind::InvalidInput => {
-                Err(RecordingError::write(&self.path, e))
-            }
-            _ => Ok(()),
-        }
+        self.writer.into_inner().sync().map_err(|e| RecordingError::write(&self.path, e))
     }
 
     fn failed(&self, error: mcap::McapError) -> RecordingError {

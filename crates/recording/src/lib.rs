@@ -2,8 +2,8 @@
 //!
 //! [`messages`] is the pure step from a tick to the messages of its topics ([`TOPICS`]), for a file
 //! or a network alike ([`static_frames`] and [`lanes_at_start`] come before the first tick). [`Recording`] takes the ticks in the world's thread and hands them over a bounded
-//! channel to a writer thread; when the disk is slower than the world, the world waits: nothing is
-//! dropped. Chunks are closed every simulated second, so that a crash loses one second at most;
+//! channel to a writer thread; when the disk is slower than the world, the world waits and nothing
+//! is left out, or ([`Backlog::Drop`], on a truck) the world goes on and the gap is counted. Chunks are closed every simulated second, so that a crash loses one second at most;
 //! [`recover`] makes a whole file of the rest. [`Reader`] reads fields by name, [`Inputs`] what the
 //! stack and its bus were given.
 //!
@@ -23,13 +23,14 @@ mod ros;
 mod schedule;
 mod telemetry;
 mod topic;
+mod writer;
 
 pub use error::RecordingError;
 pub use inputs::{
     About, BusCall, BusTrace, BusTrouble, DriverWish, GivenStep, Inputs, RawFrame, SentFrame,
 };
 pub use reader::{Entry, Reader, Wanted};
-pub use recorder::{BusHeader, Recording, RunHeader, Torn};
+pub use recorder::{Backlog, BusHeader, Recording, RunHeader, Torn};
 pub use recover::{Recovered, recover};
 pub use schedule::{Due, Schedule};
 pub use telemetry::{Combination, Geodesy, Scenery, lanes_at_start, messages, static_frames};

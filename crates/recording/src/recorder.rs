@@ -2,18 +2,17 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread::JoinHandle;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::time::Duration;
 
-use tractrix_core::{EgoState, Plan, Recorder, Scene, Step, Tick, Time};
+use tractrix_core::{Plan, Recorder, Scene, Step, Tick, Time};
 
 use crate::error::RecordingError;
 use crate::file::McapFile;
-use crate::inputs::{BusCall, BusTrace, SceneWriter, StepNote, StepNotes, call_messages};
-use crate::ros::input::{StackLimits, StackScene};
-use crate::schedule::{Due, Schedule};
-use crate::telemetry::{Scenery, lanes_at_start, messages, static_frames};
-use crate::topic::{CAN_FRAMES, CAN_TICKS, FIX, INPUT, LIMITS, TOPICS, VEHICLES};
+use crate::inputs::{BusTrace, StepNotes};
+use crate::schedule::Schedule;
+use crate::telemetry::Scenery;
+use crate::writer::{Note, Queued, Record, RunEnd, Writer};
 
 /// What a recording says about its run.
 pub struct RunHeader {
@@ -39,35 +38,36 @@ pub struct BusHeader {
     pub trace: BusTrace,
 }
 
-/// Ticks and steps in flight to the writer; the world waits when the writer is this far behind.
+/// What happens when the disk is slower than the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Backlog {
+    /// The run waits: nothing is left out.
+    Wait,
+    /// The run never waits: what the queue has no room for is left out, and counted.
+    Drop {
+        /// The end of the recording may take so long, s.
+        end_within_s: f64,
+    },
+}
+
+/// Ticks and steps in flight to the writer.
 const QUEUE: usize = 1024;
-/// Chunks are closed this often (simulated).
-const FLUSH_PERIOD: Time = Time(1_000_000_000);
-
-/// What is on its way to the writer.
-enum Note {
-    Tick(Box<Record>),
-    Step(Time, Result<Box<StepNote>, RecordingError>),
-    Calls(Vec<BusCall>),
-}
-
-/// One tick on its way to the writer.
-struct Record {
-    now: Time,
-    ego: EgoState,
-    /// Without its speed profile, and without its path where the scene is not due.
-    plan: Plan,
-    /// Empty where it is not due.
-    scene: Scene,
-    due: Due,
-}
+/// Once something was left out, so is the rest of a second: few gaps, and a writer that catches up.
+const GAP: i64 = 1_000_000_000;
 
 /// A recording under way.
 pub struct Recording {
-    sender: SyncSender<Note>,
+    queue: SyncSender<Queued>,
+    end: SyncSender<RunEnd>,
+    ended: Receiver<(Time, Result<(), RecordingError>)>,
     path: PathBuf,
-    thread: JoinHandle<(McapFile, Time, Result<(), RecordingError>)>,
     broken: bool,
+    backlog: Backlog,
+    dropped: u64,
+    /// Notes that were left out since the last one that was not.
+    gap_notes: u64,
+    /// Until then everything is left out.
+    gap_until: Time,
     schedule: Schedule,
     steps: StepNotes,
     trace: Option<BusTrace>,
@@ -78,8 +78,20 @@ impl Recording {
     ///
     /// # Errors
     /// [`RecordingError`] when the file cannot be created.
-    pub fn create(path: &Path, header: RunHeader) -> Result<Self, RecordingError> {
-        let mut file = McapFile::create(path)?;
+    pub fn create(
+        path: &Path,
+        header: RunHeader,
+        backlog: Backlog,
+    ) -> Result<Self, RecordingError> {
+        Self::on(McapFile::create(path)?, path, header, backlog)
+    }
+
+    fn on(
+        mut file: McapFile,
+        path: &Path,
+        header: RunHeader,
+        backlog: Backlog,
+    ) -> Result<Self, RecordingError> {
         file.metadata("run", header.metadata)?;
         if let Some(scenario_toml) = &header.scenario_toml {
             file.attach("scenario.toml", "application/toml", scenario_toml.as_bytes())?;
@@ -93,24 +105,68 @@ impl Recording {
         }
         let name = trace.as_ref().map(|(_, name)| name.as_str());
         let writer = Writer::open(file, header.scenery, name)?;
-        let trace = trace.map(|(trace, _)| trace);
-        let (sender, receiver) = sync_channel(QUEUE);
+        let (queue, queued) = sync_channel(QUEUE);
+        let (end, run_end) = sync_channel(1);
+        let (done, ended) = sync_channel(1);
         #[expect(clippy::disallowed_methods, reason = "a recording owns its writer's thread")]
-        let thread = std::thread::spawn(move || writer.run(&receiver));
-        let (path, steps) = (path.to_owned(), StepNotes::default());
-        Ok(Self { sender, path, thread, broken: false, schedule, steps, trace })
+        std::thread::spawn(move || {
+            // Nobody hears it who does not wait for the end
+            let _ = done.send(writer.run(&queued, &run_end));
+        });
+        Ok(Self {
+            queue,
+            end,
+            ended,
+            path: path.to_owned(),
+            broken: false,
+            backlog,
+            dropped: 0,
+            gap_notes: 0,
+            gap_until: Time::ZERO,
+            schedule,
+            steps: StepNotes::default(),
+            trace: trace.map(|(trace, _)| trace),
+        })
     }
 
-    fn send(&mut self, note: Note) {
-        if !self.broken {
-            self.broken = self.sender.send(note).is_err();
+    fn send(&mut self, now: Time, note: Note) {
+        if self.broken {
+            return;
+        }
+        let queued = Queued { gap_notes: self.gap_notes, note };
+        if self.backlog == Backlog::Wait {
+            self.broken = self.queue.send(queued).is_err();
+            return;
+        }
+        let sent = match now < self.gap_until {
+            true => Err(TrySendError::Full(queued)),
+            false => self.queue.try_send(queued),
+        };
+        match sent {
+            Ok(()) => self.gap_notes = 0,
+            Err(TrySendError::Disconnected(_)) => self.broken = true,
+            Err(TrySendError::Full(_)) => {
+                if self.gap_notes == 0 {
+                    self.gap_until = now.plus_nanos(GAP);
+                }
+                self.gap_notes += 1;
+                self.dropped += 1;
+                // What comes after the gap may not build on what is in it
+                self.steps = StepNotes::default();
+            }
         }
     }
 
-    /// Whether the writer has given up; the run must end, [`Self::finish`] says why.
+    /// Whether the writer has given up; [`Self::finish`] says why.
     #[must_use]
     pub const fn is_broken(&self) -> bool {
         self.broken
+    }
+
+    /// Notes that were left out, because the disk was slower than the run; a tick makes up to three.
+    #[must_use]
+    pub const fn dropped(&self) -> u64 {
+        self.dropped
     }
 
     /// Waits until everything is written, attaches the summary and closes the file.
@@ -119,17 +175,27 @@ impl Recording {
     /// [`Torn`] with the file and what went wrong, at whatever tick it did.
     pub fn finish(mut self, summary_json: &str) -> Result<(), Torn> {
         if let Some(trace) = self.trace.take() {
-            self.send(Note::Calls(trace.take_all()));
+            self.send(self.gap_until, Note::Calls(trace.take_all()));
         }
-        drop(self.sender);
-        let path = self.path;
-        let Ok((mut file, kept, written)) = self.thread.join() else {
-            return Err(Torn { why: RecordingError::Panicked, path, kept_s: 0.0 });
+        let end = RunEnd { gap_notes: self.gap_notes, summary_json: summary_json.to_owned() };
+        // Room for one, and a writer that has given up has said why
+        let _ = self.end.try_send(end);
+        drop(self.queue);
+        let ended = match self.backlog {
+            Backlog::Wait => self.ended.recv().map_err(|_| RecordingError::Panicked),
+            Backlog::Drop { end_within_s } => {
+                let within = Duration::try_from_secs_f64(end_within_s).unwrap_or_default();
+                self.ended.recv_timeout(within).map_err(|e| match e {
+                    RecvTimeoutError::Timeout => RecordingError::Stuck { after_s: end_within_s },
+                    RecvTimeoutError::Disconnected => RecordingError::Panicked,
+                })
+            }
         };
-        written
-            .and_then(|()| file.attach("summary.json", "application/json", summary_json.as_bytes()))
-            .and_then(|()| file.finish())
-            .map_err(|why| Torn { why, path, kept_s: kept.seconds() })
+        let (kept, written) = match ended {
+            Ok((kept, written)) => (kept, written),
+            Err(why) => (Time::ZERO, Err(why)),
+        };
+        written.map_err(|why| Torn { why, path: self.path, kept_s: kept.seconds() })
     }
 }
 
@@ -140,7 +206,7 @@ pub struct Torn {
     pub why: RecordingError,
     /// The file.
     pub path: PathBuf,
-    /// Simulated time up to which it is whole, s.
+    /// Time of the run up to which it is whole, s; 0 if that is not known.
     pub kept_s: f64,
 }
 
@@ -172,97 +238,164 @@ impl Recorder for Recording {
             scene: if due.scene { tick.scene.clone() } else { Scene::default() },
             due,
         };
-        self.send(Note::Tick(Box::new(record)));
+        self.send(tick.now, Note::Tick(Box::new(record)));
     }
 
     fn step(&mut self, step: &Step<'_>) {
         let calls = self.trace.as_ref().map(BusTrace::take).filter(|calls| !calls.is_empty());
         if let Some(calls) = calls {
-            self.send(Note::Calls(calls));
+            self.send(step.now, Note::Calls(calls));
         }
         let note = self.steps.note(step).map(Box::new);
-        self.send(Note::Step(step.now, note));
+        self.send(step.now, Note::Step(step.now, note));
     }
 }
 
-/// The writer's side.
-struct Writer {
-    file: McapFile,
-    scenery: Scenery,
-    flush_due: Time,
-    scenes: SceneWriter,
-}
+#[cfg(test)]
+mod tests {
+    use std::io::{Cursor, Seek, SeekFrom, Write};
+    use std::sync::{Arc, Condvar, Mutex};
+    use std::time::Instant;
 
-impl Writer {
-    /// Opens the topics and writes what does not change: frames and the lines of the road. The
-    /// frames' message comes before the other topics are opened.
-    fn open(
-        mut file: McapFile,
-        scenery: Scenery,
-        bus: Option<&str>,
-    ) -> Result<Self, RecordingError> {
-        let [frames, others @ ..] = &TOPICS;
-        file.open(frames)?;
-        file.write(Time::ZERO, &static_frames(&scenery)?)?;
-        for topic in others.iter().filter(|t| scenery.geodesy.is_some() || **t != FIX.topic) {
-            file.open(topic)?;
+    use tractrix_core::{Command, EgoState, LaneChoice, Stamped, VehicleLimits, VehicleStatus};
+
+    use super::*;
+    use crate::file::Disk;
+    use crate::{Combination, Inputs, Scenery};
+
+    /// A disk that takes nothing while it hangs, and keeps what it took.
+    #[derive(Clone, Default)]
+    struct Hanging(Arc<(Mutex<State>, Condvar)>);
+
+    /// Whether it hangs, and what it took.
+    type State = (bool, Cursor<Vec<u8>>);
+
+    impl Hanging {
+        fn hang(&self, hangs: bool) {
+            self.0.0.lock().unwrap().0 = hangs;
+            self.0.1.notify_all();
         }
-        if let Some(name) = bus {
-            file.open_as(&CAN_FRAMES.topic, &format!("/can/{name}/frames"))?;
-            file.open_as(&CAN_TICKS.topic, &format!("/can/{name}/ticks"))?;
+
+        fn when_it_goes<T>(&self, act: impl FnOnce(&mut Cursor<Vec<u8>>) -> T) -> T {
+            let (state, changed) = (&self.0.0, &self.0.1);
+            let mut state = changed.wait_while(state.lock().unwrap(), |state| state.0).unwrap();
+            act(&mut state.1)
         }
-        for message in lanes_at_start(&scenery)? {
-            file.write(Time::ZERO, &message)?;
-        }
-        file.flush()?;
-        Ok(Self { file, scenery, flush_due: FLUSH_PERIOD, scenes: SceneWriter::default() })
     }
 
-    /// Writes until the sender is gone; also says up to when the file is whole.
-    fn run(mut self, notes: &Receiver<Note>) -> (McapFile, Time, Result<(), RecordingError>) {
-        let mut kept = Time::ZERO;
-        let written = self.write_all(notes, &mut kept);
-        (self.file, kept, written)
+    impl Write for Hanging {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            self.when_it_goes(|file| file.write(bytes))
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            self.when_it_goes(|_| Ok(()))
+        }
     }
 
-    fn write_all(&mut self, notes: &Receiver<Note>, kept: &mut Time) -> Result<(), RecordingError> {
-        while let Ok(note) = notes.recv() {
-            match note {
-                Note::Calls(calls) => {
-                    for call in &calls {
-                        for message in call_messages(call)? {
-                            self.file.write(call.now, &message)?;
-                        }
-                    }
-                }
-                Note::Step(now, note) => self.write_step(now, *note?)?,
-                Note::Tick(record) => {
-                    let Record { now, ego, plan, scene, due } = *record;
-                    let tick = Tick { now, ego: &ego, scene: &scene, plan: &plan };
-                    for message in messages(&tick, &self.scenery, due)? {
-                        self.file.write(now, &message)?;
-                    }
-                    if now >= self.flush_due {
-                        self.flush_due = now.plus_nanos(FLUSH_PERIOD.0);
-                        self.file.flush()?;
-                        *kept = now;
-                    }
-                }
-            }
+    impl Seek for Hanging {
+        fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+            self.when_it_goes(|file| file.seek(to))
         }
-        Ok(())
     }
 
-    /// The step's messages: what it refers to comes before it.
-    fn write_step(&mut self, now: Time, note: StepNote) -> Result<(), RecordingError> {
-        let now_ns = now.0;
-        if let Some(sheet_toml) = note.sheet_toml {
-            self.file.write(now, &LIMITS.encode(&StackLimits { now_ns, sheet_toml })?)?;
+    impl Disk for Hanging {
+        fn sync(&mut self) -> std::io::Result<()> {
+            self.flush()
         }
-        if let Some(vehicles) = note.vehicles {
-            let differences = self.scenes.write(&vehicles);
-            self.file.write(now, &VEHICLES.encode(&StackScene { now_ns, differences })?)?;
+    }
+
+    const TICK: i64 = 10_000_000;
+
+    fn recording(disk: &Hanging, end_within_s: f64) -> Recording {
+        let limits = VehicleLimits::from_sheet("sheet", &crate::tests::sheet()).unwrap();
+        let header = RunHeader {
+            metadata: BTreeMap::new(),
+            scenario_toml: None,
+            stack_toml: String::new(),
+            scenery: Scenery {
+                road: Arc::new(road::builtin::flat(1_000.0)),
+                combination: Combination::new(&limits),
+                geodesy: None,
+            },
+            bus: None,
+        };
+        let file = McapFile::on(Path::new("disk"), Box::new(disk.clone())).unwrap();
+        Recording::on(file, Path::new("disk"), header, Backlog::Drop { end_within_s }).unwrap()
+    }
+
+    /// Steps and ticks of a drive, from one tick to another.
+    fn drive(recording: &mut Recording, ticks: std::ops::Range<i64>) {
+        let limits = VehicleLimits::from_sheet("sheet", &crate::tests::sheet()).unwrap();
+        let (ego, scene, plan) = (EgoState::default(), Scene::default(), Plan::default());
+        for k in ticks {
+            let now = Time(k * TICK);
+            recording.step(&Step {
+                now,
+                ego: Some(&Stamped { time: now, value: ego }),
+                status: &VehicleStatus::default(),
+                scene: Some(&scene),
+                limits: &limits,
+                limit_cap_m_s: None,
+                set_speed_m_s: 20.0,
+                wish: LaneChoice::Keep,
+                command: &Command::default(),
+            });
+            recording.record(&Tick { now, ego: &ego, scene: &scene, plan: &plan });
         }
-        self.file.write(now, &INPUT.encode(&note.input)?)
+    }
+
+    /// Steps of a file from its beginning up to a gap, and what is left out there.
+    fn steps_before_a_gap(disk: &Hanging) -> (i64, u64) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        std::fs::write(&path, disk.when_it_goes(|file| file.get_ref().clone())).unwrap();
+        let mut inputs = Inputs::open(&path, false).unwrap();
+        let mut steps = 0;
+        while let Some(step) = inputs.next_step().unwrap() {
+            assert_eq!(step.now, Time(steps * TICK));
+            steps += 1;
+        }
+        (steps, inputs.gap_notes())
+    }
+
+    /// 60 s of a drive while the disk hangs from its first second on: nothing waits, what has no
+    /// room is counted, and what comes after the disk has woken up is whole.
+    #[test]
+    fn a_disk_that_hangs_holds_nothing_up_and_the_gap_is_in_the_file() {
+        let disk = Hanging::default();
+        let mut recording = recording(&disk, 60.0);
+        drive(&mut recording, 0..100);
+        disk.hang(true);
+        let began = Instant::now();
+        drive(&mut recording, 100..6_000);
+        // 11,800 notes; a blocked send would wait for as long as the disk hangs
+        assert!(began.elapsed() < Duration::from_secs(20), "{:?}", began.elapsed());
+        let dropped = recording.dropped();
+        assert!((9_000..11_800).contains(&dropped), "{dropped}");
+        assert!(!recording.is_broken());
+        disk.hang(false);
+        while recording.gap_notes > 0 {
+            let next = recording.gap_until.0 / TICK;
+            drive(&mut recording, next..next + 100);
+        }
+        let dropped = recording.dropped();
+        recording.finish("{\"end\": true}").unwrap();
+        let (steps, gap_notes) = steps_before_a_gap(&disk);
+        assert!(steps >= 100 && gap_notes > 0 && gap_notes <= dropped, "{steps} {gap_notes}");
+        let text = disk.when_it_goes(|file| String::from_utf8_lossy(file.get_ref()).into_owned());
+        assert!(text.contains("{\"end\": true}"), "the end is in the file");
+    }
+
+    #[test]
+    fn a_disk_that_never_wakes_up_does_not_keep_who_ends_waiting() {
+        let disk = Hanging::default();
+        let mut recording = recording(&disk, 0.2);
+        drive(&mut recording, 0..100);
+        disk.hang(true);
+        drive(&mut recording, 100..200);
+        let torn = recording.finish("{}").unwrap_err();
+        assert!(matches!(torn.why, RecordingError::Stuck { .. }), "{}", torn.why);
+        disk.hang(false);
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use planner::StackConfig;
-use recording::{Combination, Geodesy, Recording, RunHeader, Scenery};
+use recording::{Backlog, Combination, Geodesy, Recording, RunHeader, Scenery};
 use road::Road;
 use tractrix_core::{Recorder, Step, Tick, VehicleLimits};
 
@@ -15,6 +15,8 @@ use crate::output;
 
 /// Name of the recording in its folder.
 const FILE: &str = "run.mcap";
+/// A truck is not kept waiting by its disk; nor is who ends the program, for longer than this, s.
+const BACKLOG: Backlog = Backlog::Drop { end_within_s: 5.0 };
 
 /// Where a recording goes.
 ///
@@ -60,7 +62,7 @@ impl Log {
         ]);
         let stack_toml = toml::to_string(stack).map_err(Failure::work)?;
         let header = RunHeader { metadata, scenario_toml: None, stack_toml, scenery, bus: None };
-        Ok(Self(Some(Recording::create(&file, header).map_err(Failure::input)?)))
+        Ok(Self(Some(Recording::create(&file, header, BACKLOG).map_err(Failure::input)?)))
     }
 
     /// Whether a recording was wanted and has failed: driving goes on without.
@@ -68,12 +70,19 @@ impl Log {
         self.0.as_ref().is_some_and(Recording::is_broken)
     }
 
+    /// Notes of ticks that were left out, because the disk was slower than the loop.
+    pub(crate) fn dropped(&self) -> u64 {
+        self.0.as_ref().map_or(0, Recording::dropped)
+    }
+
     /// Writes the end of the recording.
     pub(crate) fn finish(self, summary: &serde_json::Value) -> Result<(), Failure> {
         let Some(recording) = self.0 else { return Ok(()) };
         recording.finish(&summary.to_string()).map_err(|torn| {
-            let kept = format!("whole up to {:.1} s; sim-server recover", torn.kept_s);
-            output::note(&kept);
+            if torn.kept_s > 0.0 {
+                let kept = format!("whole up to {:.1} s; sim-server recover", torn.kept_s);
+                output::note(&kept);
+            }
             Failure::work(format!("{}: {}", torn.path.display(), torn.why))
         })
     }

@@ -366,6 +366,7 @@ impl Node<'_> {
             "driven_ticks": f.driven_ticks,
             "guarded_ticks": f.guarded_ticks,
             "recording_broken": self.log.is_broken(),
+            "notes_not_recorded": self.log.dropped(),
         })
     }
 
@@ -379,9 +380,13 @@ impl Node<'_> {
         let (f, ego) = (&self.figures, self.ego.map(|ego| ego.value).unwrap_or_default());
         let gap =
             f.least_gap_m.map_or("no vehicle ahead".to_owned(), |m| format!("nearest {m:.1} m"));
+        let lost = match self.log.dropped() {
+            0 => String::new(),
+            notes => format!(", {notes} notes not recorded"),
+        };
         output::report(&format!(
             "{:.2} s  let go at {:.1} m/s: drove {} of {} ticks ({} of them guarded, {} minimal \
-             risk), up to {:.1} m/s, {gap}, {} deadlines missed, longest tick {:.1} ms",
+             risk), up to {:.1} m/s, {gap}, {} deadlines missed, longest tick {:.1} ms{lost}",
             now.seconds(),
             ego.speed_m_s,
             f.driven_ticks,

@@ -15,6 +15,7 @@ use crate::error::RecordingError;
 use crate::records::{Records, attachment_is_whole};
 use crate::ros::input::{BusTick, CanFrame};
 use crate::topic::{CAN_FRAMES, CAN_TICKS, INPUT, LIMITS, Topic, VEHICLES};
+use crate::writer::GAP_RECORD;
 
 /// What a recording says about its run.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -58,6 +59,7 @@ pub struct Inputs {
     channels: BTreeMap<u16, Kind>,
     with_bus: bool,
     is_at_end: bool,
+    gap_notes: u64,
     scenes: SceneReader,
     vehicles: Vec<Neighbour>,
     limits: Option<Box<VehicleLimits>>,
@@ -83,6 +85,7 @@ impl Inputs {
             channels: BTreeMap::new(),
             with_bus,
             is_at_end: false,
+            gap_notes: 0,
             scenes: SceneReader::default(),
             vehicles: Vec::new(),
             limits: None,
@@ -130,6 +133,13 @@ impl Inputs {
         Ok(self.calls.pop_front())
     }
 
+    /// Notes that the recorder left out where the inputs end, because its disk was too slow; 0: they
+    /// end with the drive.
+    #[must_use]
+    pub const fn gap_notes(&self) -> u64 {
+        self.gap_notes
+    }
+
     /// Takes the next record; false at the end.
     fn advance(&mut self) -> Result<bool, RecordingError> {
         if self.is_at_end {
@@ -175,6 +185,12 @@ impl Inputs {
             }
             Record::Attachment { header, data, .. } => {
                 self.about.files.insert(header.name, data.into_owned());
+            }
+            // The inputs after a gap are of a stack that has seen what is in it
+            Record::Metadata(metadata) if metadata.name == GAP_RECORD => {
+                self.is_at_end = true;
+                let notes = metadata.metadata.get("notes").and_then(|n| n.parse().ok());
+                self.gap_notes = notes.unwrap_or(u64::MAX);
             }
             Record::Metadata(metadata) => {
                 self.about.metadata.insert(metadata.name, metadata.metadata);

@@ -159,6 +159,9 @@ fn replay(args: &Args, stages: &Stages) -> Result<(Provenance, Comparison), Fail
             stages.show(&format!("{:.0} s compared", now.seconds()));
         }
     }
+    if inputs.gap_notes() > 0 {
+        output::note("compared up to the first gap: the recorder's disk was too slow there");
+    }
     Ok((Provenance::of_seed(seed.unwrap_or_default()), comparison))
 }
 

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use planner::decider::DeciderKind;
-use recording::{BusHeader, Combination, Geodesy, Recording, RunHeader, Scenery};
+use recording::{Backlog, BusHeader, Combination, Geodesy, Recording, RunHeader, Scenery};
 use road::Road;
 use sim::{BusFigures, EndReason, GhostReport, RunReport, Scenario, TrafficKind, WallClock, World};
 use tokio::sync::Notify;
@@ -170,7 +170,7 @@ fn start_recording(
     });
     let scenery = Scenery { road, combination, geodesy };
     let header = RunHeader { metadata, scenario_toml, stack_toml, scenery, bus };
-    Ok(Recording::create(&out.begin("run.mcap")?, header)?)
+    Ok(Recording::create(&out.begin("run.mcap")?, header, Backlog::Wait)?)
 }
 
 /// A signal stops the run between two ticks, and ends the waiting of whoever waits for it.
