@@ -12,6 +12,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 extern crate alloc;
 
+mod can;
 mod command;
 mod ego;
 mod error;
@@ -33,6 +34,7 @@ mod time;
 #[cfg(feature = "std")]
 pub mod words;
 
+pub use can::{BusRecorder, BusTrouble, RawFrame};
 pub use command::{BrakeMode, Command, GearRequest};
 pub use ego::{EgoState, PowertrainSignals, TrailerState};
 pub use error::CoreError;

@@ -11,6 +11,7 @@ use crate::{Frame, Id, J1939Error, Message, Slot};
 
 /// How a sum is folded into a checksum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 pub enum Formula {
     /// TSC1: three bits (SPN 4207).
     ThreeBits,
@@ -20,6 +21,7 @@ pub enum Formula {
 
 /// How a message proves that it is whole and new.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 pub struct Protection {
     /// How the sum is folded.
     pub formula: Formula,
@@ -47,6 +49,7 @@ impl Protection {
 
 /// What a protected message travels in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 pub struct Carrier {
     /// Parameter group on the wire; another than the message's own where a maker wants it so.
     pub pgn: u32,

@@ -27,6 +27,7 @@ const PRIORITY: u8 = 6;
 
 /// NAME of a node: 64 bits, the smaller one keeps the address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 pub struct Name(pub u64);
 
 impl Name {

@@ -5,6 +5,8 @@
 
 use embedded_can::{ExtendedId, Id as CanId};
 
+use tractrix_core::RawFrame;
+
 use crate::{Id, J1939Error};
 
 /// An identifier and up to eight bytes.
@@ -43,6 +45,21 @@ impl Frame {
     #[must_use]
     pub fn bytes(&self) -> &[u8] {
         self.data.get(..usize::from(self.len)).unwrap_or(&self.data)
+    }
+}
+
+impl From<&Frame> for RawFrame {
+    fn from(frame: &Frame) -> Self {
+        let mut data = [0; 8];
+        data.iter_mut().zip(frame.bytes()).for_each(|(to, from)| *to = *from);
+        Self { id: frame.id.raw(), len: frame.len, data }
+    }
+}
+
+impl From<RawFrame> for Frame {
+    /// More than eight bytes are eight.
+    fn from(raw: RawFrame) -> Self {
+        Self { id: Id::from_raw(raw.id), len: raw.len.min(8), data: raw.data }
     }
 }
 

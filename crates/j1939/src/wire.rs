@@ -6,6 +6,7 @@ use crate::Frame;
 
 /// Speed of a J1939 bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 pub enum BitRate {
     /// 250 kbit/s (SAE J1939-11, -15).
     Kbit250,

@@ -2,17 +2,21 @@
 //! engaged: what these trucks do not send it misses, and says so in its status, not as an event.
 #![allow(clippy::unwrap_used)]
 
+use core::cell::Cell;
 use core::convert::Infallible;
 use std::io::BufReader;
 
 use flate2::read::GzDecoder;
 use j1939::bus::candump::{Pace, Reader, Replay};
-use j1939::bus::tap::{Tap, Tapped};
+use j1939::bus::tap::Tap;
 use j1939::steering::ExampleSteering;
 use j1939::supervise::BusFault;
 use j1939::truck::{BusTruck, BusTruckConfig};
-use j1939::{BitRate, Message, message::Eec1, message::Tsc1};
-use tractrix_core::{Pose, PoseSource, Stamped, Time, Vehicle, VehicleFault, VehicleLimits};
+use j1939::{BitRate, Id, Message, message::Eec1, message::Tsc1};
+use tractrix_core::{
+    BusRecorder, BusTrouble, Pose, PoseSource, RawFrame, Stamped, Time, Vehicle, VehicleFault,
+    VehicleLimits,
+};
 
 struct Here;
 
@@ -32,22 +36,32 @@ struct Heard {
     intruder: Option<(VehicleFault, f64, usize)>,
 }
 
+/// Counts frames, and demands of torque from the brakes to the engine.
+struct Counts<'a> {
+    frames_and_demands: &'a Cell<(usize, usize)>,
+}
+
+impl BusRecorder for Counts<'_> {
+    fn received(&mut self, _: Time, what: Result<Option<Stamped<RawFrame>>, BusTrouble>) {
+        let Ok(Some(heard)) = what else { return };
+        let id = Id::from_raw(heard.value.id);
+        let is_demand = id.pgn() == Tsc1::TABLE.pgn && id.sa() == 0x0B && id.da() == 0;
+        let (frames, demands) = self.frames_and_demands.get();
+        self.frames_and_demands.set((frames + 1, demands + usize::from(is_demand)));
+    }
+
+    fn sent(&mut self, _: Time, _: RawFrame, _: Option<BusTrouble>) {}
+}
+
 fn heard(log: &str, rate: BitRate) -> Heard {
     let path = format!("{}/../../tests/data/j1939/{log}.log.gz", env!("CARGO_MANIFEST_DIR"));
     let file = std::fs::File::open(&path).unwrap_or_else(|e| panic!("{path}: {e}"));
     let reader = Reader::new(BufReader::new(GzDecoder::new(file)));
-    let (mut demands, mut frames) = (0, 0_usize);
-    let counted = std::cell::Cell::new((0, 0));
-    let bus =
-        Tap::new(Replay::new(reader, None, Pace::Recorded, Time::ZERO), |_, what: Tapped<'_>| {
-            if let Tapped::Received(heard) = what {
-                let id = heard.value.id();
-                frames += 1;
-                demands +=
-                    usize::from(id.pgn() == Tsc1::TABLE.pgn && id.sa() == 0x0B && id.da() == 0);
-                counted.set((frames, demands));
-            }
-        });
+    let counted = Cell::new((0, 0));
+    let bus = Tap::new(
+        Replay::new(reader, None, Pace::Recorded, Time::ZERO),
+        Counts { frames_and_demands: &counted },
+    );
     let sheet = include_str!("data/longhaul_sheet.toml");
     let limits = VehicleLimits::from_sheet("longhaul", sheet).unwrap();
     let steering: Option<ExampleSteering> = None;

@@ -26,9 +26,7 @@ mod topic;
 mod writer;
 
 pub use error::RecordingError;
-pub use inputs::{
-    About, BusCall, BusTrace, BusTrouble, DriverWish, GivenStep, Inputs, RawFrame, SentFrame,
-};
+pub use inputs::{About, BusCall, BusTrace, DriverWish, GivenStep, Inputs, SentFrame};
 pub use reader::{Entry, Reader, Wanted};
 pub use recorder::{Backlog, BusHeader, Recording, RunHeader, Torn};
 pub use recover::{Recovered, recover};

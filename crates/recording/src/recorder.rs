@@ -9,7 +9,7 @@ use tractrix_core::{Plan, Recorder, Scene, Step, Tick, Time};
 
 use crate::error::RecordingError;
 use crate::file::McapFile;
-use crate::inputs::{BusTrace, StepNotes};
+use crate::inputs::{BUS_RECORD, BusTrace, DRIVER_KEY, StepNotes};
 use crate::schedule::Schedule;
 use crate::telemetry::Scenery;
 use crate::writer::{Note, Queued, Record, RunEnd, Writer};
@@ -18,10 +18,9 @@ use crate::writer::{Note, Queued, Record, RunEnd, Writer};
 pub struct RunHeader {
     /// Name and value: seed, version, revision, start of the run.
     pub metadata: BTreeMap<String, String>,
-    /// The scenario as it was run, where there was one.
-    pub scenario_toml: Option<String>,
-    /// The stack's configuration.
-    pub stack_toml: String,
+    /// What the run was made of, by file names: `stack.toml` with the stack's configuration always,
+    /// and `scenario.toml`, `sheet.toml` or `road.xodr` where there is one.
+    pub files: BTreeMap<&'static str, String>,
     /// What does not change during the run.
     pub scenery: Scenery,
     /// The bus that the truck is driven over.
@@ -30,10 +29,10 @@ pub struct RunHeader {
 
 /// What a recording says about the bus that the truck is driven over.
 pub struct BusHeader {
-    /// Its name: the frames are on `/can/NAME/frames`.
-    pub name: String,
-    /// Name and value: bit rate, configuration of the driver.
-    pub metadata: BTreeMap<String, String>,
+    /// How it is reached: `bus`, `can:can0`. The frames are on `/can/can0/frames`.
+    pub vehicle: String,
+    /// What the truck's driver is set up with (JSON).
+    pub driver_json: String,
     /// What goes over it.
     pub trace: BusTrace,
 }
@@ -93,15 +92,18 @@ impl Recording {
         backlog: Backlog,
     ) -> Result<Self, RecordingError> {
         file.metadata("run", header.metadata)?;
-        if let Some(scenario_toml) = &header.scenario_toml {
-            file.attach("scenario.toml", "application/toml", scenario_toml.as_bytes())?;
+        for (name, text) in &header.files {
+            let kind = if name.ends_with(".toml") { "application/toml" } else { "application/xml" };
+            file.attach(name, kind, text.as_bytes())?;
         }
-        file.attach("stack.toml", "application/toml", header.stack_toml.as_bytes())?;
         let schedule = Schedule::new(&header.scenery.road);
         let mut trace = None;
         if let Some(bus) = header.bus {
-            file.metadata("bus", bus.metadata)?;
-            trace = Some((bus.trace, bus.name));
+            let name = bus.vehicle.rsplit([':', '/']).next().unwrap_or_default().to_owned();
+            let values = [("vehicle", bus.vehicle), (DRIVER_KEY, bus.driver_json)];
+            let values = values.map(|(key, value)| (key.to_owned(), value));
+            file.metadata(BUS_RECORD, BTreeMap::from(values))?;
+            trace = Some((bus.trace, name));
         }
         let name = trace.as_ref().map(|(_, name)| name.as_str());
         let writer = Writer::open(file, header.scenery, name)?;
@@ -311,8 +313,7 @@ mod tests {
         let limits = VehicleLimits::from_sheet("sheet", &crate::tests::sheet()).unwrap();
         let header = RunHeader {
             metadata: BTreeMap::new(),
-            scenario_toml: None,
-            stack_toml: String::new(),
+            files: BTreeMap::new(),
             scenery: Scenery {
                 road: Arc::new(road::builtin::flat(1_000.0)),
                 combination: Combination::new(&limits),

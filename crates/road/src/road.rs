@@ -330,9 +330,23 @@ impl Road {
             _ if has_extension(name, "csv") => crate::csv_profile::read(name)?,
             _ => return Err(RoadError::UnknownRoad { name: name.into() }),
         };
-        match crate::findings::refusal(&road.findings()) {
+        road.refused(name)
+    }
+
+    /// Reads a road from the text of an OpenDRIVE file; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    #[cfg(feature = "std")]
+    pub fn from_xodr(name: &str, text: &str) -> Result<Self, RoadError> {
+        crate::opendrive::Network::parse(name, text)?.longest_route()?.refused(name)
+    }
+
+    #[cfg(feature = "std")]
+    fn refused(self, name: &str) -> Result<Self, RoadError> {
+        match crate::findings::refusal(&self.findings()) {
             Some(why) => Err(RoadError::Invalid { name: name.into(), why }),
-            None => Ok(road),
+            None => Ok(self),
         }
     }
 

@@ -5,7 +5,6 @@
 //! to viewers. Only this crate knows an async runtime.
 
 mod bus_log;
-mod bus_record;
 mod cli;
 mod cmd;
 mod dashboard;

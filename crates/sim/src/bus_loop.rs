@@ -4,11 +4,9 @@
 use j1939::bus::loopback::{Loopback, LoopbackNode};
 use j1939::bus::{Bus, BusError};
 use j1939::steering::ExampleSteering;
-use j1939::truck::{BusTruck, BusTruckConfig, Engagement};
+use j1939::truck::{BusTruck, BusTruckConfig, DriverSetup, Engagement};
 use j1939::{BitRate, BusLoad, Frame};
-use tractrix_core::{
-    Command, EgoState, PoseSource, Stamped, Time, Vehicle, VehicleLimits, VehicleStatus,
-};
+use tractrix_core::{Command, EgoState, Stamped, Time, Vehicle, VehicleLimits, VehicleStatus};
 
 use crate::ecu::{Ahead, EcuConfig, EcuSim};
 use crate::{PlantPose, PoseNoise, SimError, SimTruck, Simulated};
@@ -25,25 +23,10 @@ const DRIVER_NODE: usize = 1;
 
 /// What drives the truck of a simulation over a bus: addresses and carriers of the standard, the
 /// example steering frame.
-///
-/// # Errors
-/// [`SimError`] if the truck's sheet cannot be planned with.
-pub fn bus_driver<B: Bus, P: PoseSource>(
-    bus: B,
-    rate: BitRate,
-    pose: P,
-    limits: VehicleLimits,
-) -> Result<BusTruck<B, P, ExampleSteering>, SimError> {
-    let steering = Some(ExampleSteering::new(EcuConfig::default().steering_key));
-    BusTruck::new(bus, rate, pose, steering, limits, BusTruckConfig::default())
-        .map_err(|e| SimError::Drive(e.to_string()))
-}
-
-/// How [`bus_driver`] is set up, in words that differ if it differs.
 #[must_use]
-pub fn bus_driver_setup() -> String {
-    let (driver, truck) = (BusTruckConfig::default(), EcuConfig::default());
-    format!("{driver:?}, steering key {}", truck.steering_key)
+pub fn bus_driver_setup(rate: BitRate) -> DriverSetup {
+    let steering_key = Some(EcuConfig::default().steering_key);
+    DriverSetup { rate, config: BusTruckConfig::default(), steering_key }
 }
 
 /// One end's way to the bus. A clone is cut off: who copies both ends connects them again.
@@ -172,7 +155,7 @@ impl BusLoop {
         let config = EcuConfig::default();
         let ecu = EcuSim::new(truck, ecu, config, start, Some(Time::ZERO))?;
         let pose = PlantPose::new(PoseNoise::default(), 0, ecu.ego());
-        let driver = bus_driver(driver, rate, pose, limits)?;
+        let driver = bus_driver_setup(rate).driver(driver, pose, limits).map_err(drive_error)?;
         let mut looped = Self { wire, ecu, driver, figures: BusFigures::default(), ahead_ns: 0 };
         looped.warm_up(start)?;
         Ok(looped)

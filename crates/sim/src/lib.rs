@@ -59,7 +59,7 @@ mod traffic_section;
 mod truck;
 mod world;
 
-pub use bus_loop::{BusFigures, BusLoop, End, bus_driver, bus_driver_setup};
+pub use bus_loop::{BusFigures, BusLoop, End, bus_driver_setup};
 pub use collision::{Footprint, footprints_overlap};
 pub use drivability::{Drivability, Drive, Spread};
 pub use error::SimError;

@@ -110,7 +110,7 @@ impl Checks {
         pose(now, truck, &mut report)?;
         report.add("radar", radar_s <= RADAR_AGE_MAX_S, heard(radar_s, RADAR_AGE_MAX_S));
         self.truck(&r, &mut report)?;
-        let steering = match self.table.steering() {
+        let steering = match self.table.steering_key() {
             Some(_) => "by the frame that the sheet names",
             None => "none: the sheet names no steering frame, the driver steers",
         };
@@ -178,7 +178,7 @@ impl Checks {
             None => "EBC5 has not come",
         };
         report.add("brakes' consent", r.brakes_accept == Some(true), says.to_owned());
-        let consent = r.engine_accepts.unwrap_or(!self.table.config(0).needs_adss);
+        let consent = r.engine_accepts.unwrap_or(!self.table.needs_adss);
         let says = match r.engine_accepts {
             Some(true) => "takes demands (ADSS)",
             Some(false) => "takes no demands (ADSS)",

@@ -1,6 +1,5 @@
 //! The loop: checks, driving, the stop at the end.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -10,6 +9,7 @@ use j1939::steering::ExampleSteering;
 use j1939::truck::{BusTruck, Engagement};
 use planner::localise::Localiser;
 use planner::{Stack, StackConfig, drive_tick};
+use recording::DriverWish;
 use road::Road;
 use serde_json::json;
 use tractrix_core::{Command, EgoState, Stamped, Time, Vehicle};
@@ -30,7 +30,7 @@ use crate::sheet::Sheet;
 use crate::watchdog::Watchdog;
 
 /// The truck behind its bus.
-pub(crate) type Truck = BusTruck<Live<Box<dyn Bus + Send + Sync>>, NodePose, ExampleSteering>;
+pub(crate) type Truck = BusTruck<Box<dyn Bus + Send + Sync>, NodePose, ExampleSteering>;
 
 /// Below this speed the truck stands, m/s; for so long, s.
 const STANDS_M_S: f64 = 0.05;
@@ -109,22 +109,12 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let bus = j1939::bus::open(&name).map_err(|e| Failure::input(format!("--can {e}")))?;
     let mut bus = Live::new(bus, clock);
     let present = roll_call(&mut bus, clock, &name, sheet.bus.address)?;
-    let checks = Checks::new(name, sheet.bus.clone(), limits.road_load.mass_kg, present);
-    let truck = BusTruck::new(
-        bus,
-        args.bit_rate.into(),
-        NodePose::new(localiser, receiver),
-        sheet.bus.steering(),
-        limits.clone(),
-        sheet.bus.config(std::process::id() as u8),
-    )
-    .map_err(Failure::input)?;
-    let set_up = BTreeMap::from([
-        ("road".to_owned(), args.map.clone()),
-        ("truck".to_owned(), args.truck.display().to_string()),
-    ]);
-    let out = args.out.as_deref();
-    let log = Log::begin(out, args.overwrite, &road, &limits, stack.config(), set_up)?;
+    let setup = sheet.bus.setup(args.bit_rate.into(), std::process::id() as u8);
+    let log = Log::begin(args, &road, &sheet, stack.config(), &setup)?;
+    let pose = NodePose::new(localiser, receiver);
+    let truck =
+        setup.driver(log.tapped(bus), pose, sheet.limits.clone()).map_err(Failure::input)?;
+    let checks = Checks::new(name, sheet.bus, limits.road_load.mass_kg, present);
     let mut node = Node {
         args,
         clock,
@@ -139,6 +129,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         health,
         asked_to_end,
         phase: Phase::Checking,
+        wish: DriverWish::None,
         ego: None,
         figures: Figures::default(),
         told: (String::new(), Time::ZERO),
@@ -164,6 +155,8 @@ struct Node<'a> {
     health: Option<Health>,
     asked_to_end: Arc<AtomicBool>,
     phase: Phase,
+    /// What is wished of the truck's driver at the beginning of the next tick.
+    wish: DriverWish,
     ego: Option<Stamped<EgoState>>,
     figures: Figures,
     /// What was said last about what is missing, and when.
@@ -203,6 +196,7 @@ impl Node<'_> {
 
     /// Reads, plans, commands, records.
     fn one_tick(&mut self, now: Time) {
+        self.grant(now);
         self.truck.pose_source().poll();
         self.radar.see(self.truck.lead());
         let (truck, radar, stack) = (&mut self.truck, &mut self.radar, &mut self.stack);
@@ -223,6 +217,18 @@ impl Node<'_> {
         }
     }
 
+    /// Tells the truck's driver what is wished of it, and the recording with it.
+    fn grant(&mut self, now: Time) {
+        let wish = std::mem::take(&mut self.wish);
+        self.log.wished(wish);
+        match wish {
+            DriverWish::None => {}
+            DriverWish::Engage => self.truck.engage(),
+            DriverWish::Disengage => self.truck.disengage(now),
+            DriverWish::Stop => self.truck.stop(now),
+        }
+    }
+
     /// What comes next; `Some` at the end.
     fn judge(
         &mut self,
@@ -233,12 +239,12 @@ impl Node<'_> {
         let passed = self.clock.elapsed().saturating_sub(start);
         let over = self.args.duration.is_some_and(|s| passed.as_secs_f64() >= s);
         if (over || self.asked_to_end.load(Ordering::Relaxed)) && !self.is_stopping() {
-            self.truck.stop(now);
             if !self.truck.engagement().actuates() {
                 return Ok(Some(Ok(())));
             }
             output::report(&format!("{:.2} s  asked to end: stops", now.seconds()));
             self.phase = Phase::Stopping(now);
+            self.wish = DriverWish::Stop;
         }
         match self.phase {
             Phase::Checking => {
@@ -247,7 +253,7 @@ impl Node<'_> {
                     output::report(&format!("{:.2} s  ready\n{}", now.seconds(), report.text()));
                     self.phase = Phase::Running;
                     if self.args.engage_after_checks {
-                        self.truck.engage();
+                        self.wish = DriverWish::Engage;
                     }
                 } else if passed.as_secs_f64() >= self.args.ready_within {
                     output::report(&format!(

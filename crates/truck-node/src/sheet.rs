@@ -8,9 +8,8 @@
 use std::path::Path;
 
 use j1939::check::Carrier;
-use j1939::steering::ExampleSteering;
-use j1939::truck::BusTruckConfig;
-use j1939::{NULL_ADDRESS, Name, PGN_MAX};
+use j1939::truck::{BusTruckConfig, DriverSetup};
+use j1939::{BitRate, NULL_ADDRESS, Name, PGN_MAX};
 use planner::localise::LocaliserConfig;
 use serde::Deserialize;
 use tractrix_core::VehicleLimits;
@@ -26,6 +25,8 @@ pub(crate) struct Sheet {
     pub(crate) limits: VehicleLimits,
     pub(crate) bus: BusTable,
     pub(crate) pose: LocaliserConfig,
+    /// As it was read.
+    pub(crate) text: String,
 }
 
 /// `[bus]`.
@@ -45,7 +46,7 @@ pub(crate) struct BusTable {
     /// Control purpose in TSC1, 0 to 31; 6 is P7.
     control_purpose: u8,
     /// The engine must say in ADSS that it is ready for an automated driving system.
-    needs_adss: bool,
+    pub(crate) needs_adss: bool,
     tsc1: Tsc1,
     xbr: Xbr,
     /// The maker's steering frame; without it the truck is not steered.
@@ -177,7 +178,7 @@ impl BusTable {
     }
 
     /// As the library takes it.
-    pub(crate) fn config(&self, claim_delay_steps: u8) -> BusTruckConfig {
+    fn config(&self, claim_delay_steps: u8) -> BusTruckConfig {
         let Retarders { engine, driveline, exhaust } = self.retarders;
         let mut tsc1 = Carrier::TSC1;
         tsc1.protection.key = self.tsc1.key;
@@ -204,10 +205,15 @@ impl BusTable {
         }
     }
 
-    /// The steering frame that the sheet names.
-    pub(crate) fn steering(&self) -> Option<ExampleSteering> {
-        self.steering
-            .map(|Steering { frame: SteeringFrame::Example, key, .. }| ExampleSteering::new(key))
+    /// What drives the truck, as the library takes it.
+    pub(crate) fn setup(&self, rate: BitRate, claim_delay_steps: u8) -> DriverSetup {
+        let config = self.config(claim_delay_steps);
+        DriverSetup { rate, config, steering_key: self.steering_key() }
+    }
+
+    /// Key of the steering frame that the sheet names.
+    pub(crate) fn steering_key(&self) -> Option<u8> {
+        self.steering.map(|Steering { frame: SteeringFrame::Example, key, .. }| key)
     }
 
     /// The engine's address.
@@ -258,7 +264,7 @@ impl Sheet {
             None => LocaliserConfig::default(),
         };
         pose.check().map_err(|why| wrong("pose", &why))?;
-        Ok(Self { limits, bus, pose })
+        Ok(Self { limits, bus, pose, text: text.to_owned() })
     }
 }
 
@@ -272,7 +278,7 @@ mod tests {
         let config = BusTable::default().config(standard.claim_delay_steps);
         assert!(standard.name.can_choose() && !config.name.can_choose());
         assert_eq!(BusTruckConfig { name: standard.name, ..config }, standard);
-        assert!(BusTable::default().steering().is_none());
+        assert!(BusTable::default().steering_key().is_none());
     }
 
     /// The example of docs/truck.md, commented lines included.
@@ -287,7 +293,7 @@ mod tests {
         let config = bus.config(0);
         assert_eq!(config.retarders, [Some(0x0F), None, Some(0x29)]);
         assert_eq!(config.xbr, Carrier::proprietary_xbr(0x3C));
-        assert!(config.needs_adss && bus.vin.is_some() && bus.steering().is_some());
+        assert!(config.needs_adss && bus.vin.is_some() && bus.steering_key() == Some(0x5A));
         let pose: LocaliserConfig = tables["pose"].clone().try_into().unwrap();
         pose.check().unwrap();
         assert_eq!(pose.antenna_ahead_m, 3.1);

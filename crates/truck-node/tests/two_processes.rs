@@ -7,7 +7,7 @@ mod support;
 use std::io::Read;
 use std::net::TcpStream;
 
-use support::{Files, Wire, number_after};
+use support::{Files, Wire, number_after, sim_server};
 
 /// Engages, follows what drives ahead, and stops when it is asked to end.
 fn drives_and_stops(bus: &str, drive_s: f64) {
@@ -49,7 +49,23 @@ fn drives_and_stops(bus: &str, drive_s: f64) {
     println!("{said}");
     assert_eq!(status.code(), Some(0), "{said}");
     assert!(said.contains(" 0 collisions"), "{said}");
-    assert!(std::path::Path::new(&out).join("run.mcap").exists());
+    std::fs::remove_file(files.path("road.xodr")).unwrap();
+    for from in ["frames", "ego"] {
+        assert_same_again(&format!("{out}/run.mcap"), from);
+    }
+}
+
+/// The recording holds all that drove the truck: road, sheet, set-up, frames.
+fn assert_same_again(file: &str, from: &str) {
+    let replayed =
+        sim_server().args(["process-replay", file, "--from", from, "--json"]).output().unwrap();
+    let errors = String::from_utf8_lossy(&replayed.stderr).into_owned();
+    let report: serde_json::Value =
+        serde_json::from_slice(&replayed.stdout).unwrap_or_else(|e| panic!("{e}: {errors}"));
+    println!("{report}");
+    assert_eq!((replayed.status.code(), &report["ticks_different"]), (Some(0), &0.into()));
+    assert!(report["ticks_compared"].as_u64().unwrap() > 300, "{report}");
+    assert!(!errors.contains("cannot tell"), "{errors}");
 }
 
 /// A free port of this machine; somebody else may take it, but nobody here does.

@@ -1,5 +1,7 @@
 //! What a bus can refuse.
 
+use tractrix_core::BusTrouble;
+
 /// Why a frame could not be sent or received.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -28,4 +30,27 @@ pub enum BusError {
         /// What the operating system said.
         why: String,
     },
+}
+
+impl From<&BusError> for BusTrouble {
+    fn from(error: &BusError) -> Self {
+        match error {
+            BusError::Full(_) => Self::Full,
+            BusError::Off => Self::Off,
+            #[cfg(feature = "std")]
+            _ => Self::Other,
+        }
+    }
+}
+
+#[cfg(feature = "std")]
+impl From<BusTrouble> for BusError {
+    /// What a recording does not hold of it is left out.
+    fn from(trouble: BusTrouble) -> Self {
+        match trouble {
+            BusTrouble::Full => Self::Full(0),
+            BusTrouble::Off => Self::Off,
+            BusTrouble::Other => Self::Io { what: "bus".to_owned(), why: "as recorded".to_owned() },
+        }
+    }
 }

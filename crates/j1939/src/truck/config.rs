@@ -8,6 +8,7 @@ use crate::check::Carrier;
 /// Addresses, carriers and limits of a [`super::BusTruck`]. The default is the standard's: preferred
 /// addresses of SAE J1939 appendix B, no proprietary frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "std", derive(serde::Serialize, serde::Deserialize))]
 pub struct BusTruckConfig {
     /// NAME of the driving system.
     pub name: Name,

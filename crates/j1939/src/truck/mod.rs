@@ -12,6 +12,7 @@
 //! | `demand` | a command as messages and back, for both ends |
 //! | `torque` | torque in TSC1 and EEC1, for both ends |
 //! | `send` | what goes out, and when |
+//! | `setup` | all of its set-up, for a recording |
 
 mod bus_truck;
 mod config;
@@ -20,6 +21,8 @@ mod ego;
 mod engagement;
 mod heard;
 mod send;
+#[cfg(feature = "std")]
+mod setup;
 mod torque;
 mod watch;
 
@@ -31,6 +34,8 @@ pub use demand::{
 };
 pub use engagement::Engagement;
 pub use heard::Lead;
+#[cfg(feature = "std")]
+pub use setup::DriverSetup;
 pub use torque::{TORQUE_STEP_FRAC, Torque};
 
 /// Which of [`BusTruckConfig::retarders`] acts behind the gearbox.

@@ -6,7 +6,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tractrix_core::{Stamped, Time};
+use tractrix_core::{BusRecorder, BusTrouble, RawFrame, Stamped, Time};
 
 use crate::error::RecordingError;
 use crate::ros::input::{BusTick, CanFrame, FrameHeader};
@@ -22,28 +22,6 @@ const TROUBLES: [(BusTrouble, u32); 3] =
 pub(super) const RECEIVED: &str = "received";
 pub(super) const SENT: &str = "sent";
 
-/// A frame of a classic CAN bus with a 29-bit identifier.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct RawFrame {
-    /// Identifier.
-    pub id: u32,
-    /// Number of bytes.
-    pub len: u8,
-    /// Bytes; zero beyond `len`.
-    pub data: [u8; 8],
-}
-
-/// Why the bus could not be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BusTrouble {
-    /// The send queue had no room.
-    Full,
-    /// The controller was off the bus.
-    Off,
-    /// Anything else.
-    Other,
-}
-
 /// What was wished of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum DriverWish {
@@ -54,6 +32,8 @@ pub enum DriverWish {
     Engage,
     /// To let go.
     Disengage,
+    /// The minimal-risk manoeuvre.
+    Stop,
 }
 
 /// A frame that was to be sent.
@@ -121,25 +101,6 @@ impl BusTrace {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The bus was asked for a frame: it gave one, had none (`None`), or failed.
-    pub fn received(&self, now: Time, what: Result<Option<Stamped<RawFrame>>, BusTrouble>) {
-        let mut state = self.state();
-        let reading = state.reading(now);
-        match what {
-            Ok(Some(frame)) => reading.received.push(Ok(frame)),
-            Ok(None) => {}
-            Err(trouble) => reading.received.push(Err(trouble)),
-        }
-        state.drained = !matches!(what, Ok(Some(_)));
-    }
-
-    /// The bus was given a frame.
-    pub fn sent(&self, frame: SentFrame) {
-        if let Some(call) = &mut self.state().current {
-            call.sent.push(frame);
-        }
-    }
-
     /// Something is wished of the driver before the next reading.
     pub fn wished(&self, wish: DriverWish) {
         self.state().wish = wish;
@@ -157,6 +118,25 @@ impl BusTrace {
         let mut state = self.state();
         state.close();
         std::mem::take(&mut state.done)
+    }
+}
+
+impl BusRecorder for BusTrace {
+    fn received(&mut self, now: Time, what: Result<Option<Stamped<RawFrame>>, BusTrouble>) {
+        let mut state = self.state();
+        let reading = state.reading(now);
+        match what {
+            Ok(Some(frame)) => reading.received.push(Ok(frame)),
+            Ok(None) => {}
+            Err(trouble) => reading.received.push(Err(trouble)),
+        }
+        state.drained = !matches!(what, Ok(Some(_)));
+    }
+
+    fn sent(&mut self, _now: Time, frame: RawFrame, trouble: Option<BusTrouble>) {
+        if let Some(call) = &mut self.state().current {
+            call.sent.push(SentFrame { frame, trouble });
+        }
     }
 }
 
@@ -181,6 +161,7 @@ pub(crate) fn call_messages(call: &BusCall) -> Result<Vec<TopicMessage>, Recordi
             DriverWish::None => 0,
             DriverWish::Engage => 1,
             DriverWish::Disengage => 2,
+            DriverWish::Stop => 3,
         },
     })?);
     Ok(messages)
@@ -215,6 +196,7 @@ pub(super) const fn wish_of(code: u8) -> Option<DriverWish> {
         0 => DriverWish::None,
         1 => DriverWish::Engage,
         2 => DriverWish::Disengage,
+        3 => DriverWish::Stop,
         _ => return None,
     })
 }
@@ -229,13 +211,13 @@ mod tests {
 
     #[test]
     fn a_reading_ends_before_the_next_one_begins_even_at_the_same_time() {
-        let trace = BusTrace::default();
+        let mut trace = BusTrace::default();
         let said = SentFrame { frame: heard(0, 9).value, trouble: Some(BusTrouble::Full) };
-        trace.sent(said); // before any reading: nobody's
+        trace.sent(Time(-10), said.frame, said.trouble); // before any reading: nobody's
         trace.received(Time(-10), Ok(Some(heard(-12, 1))));
         trace.received(Time(-10), Ok(Some(heard(-11, 2))));
         trace.received(Time(-10), Ok(None));
-        trace.sent(said);
+        trace.sent(Time(-10), said.frame, said.trouble);
         trace.wished(DriverWish::Engage);
         assert_eq!(trace.take(), []);
         trace.received(Time(-10), Err(BusTrouble::Off));

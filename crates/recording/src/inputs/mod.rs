@@ -13,8 +13,9 @@ mod scene;
 mod step;
 
 pub(crate) use bus::call_messages;
-pub use bus::{BusCall, BusTrace, BusTrouble, DriverWish, RawFrame, SentFrame};
+pub use bus::{BusCall, BusTrace, DriverWish, SentFrame};
 pub use reader::{About, Inputs};
+pub(crate) use reader::{BUS_RECORD, DRIVER_KEY};
 pub(crate) use scene::SceneWriter;
 pub use step::GivenStep;
 pub(crate) use step::{StepNote, StepNotes};

@@ -17,6 +17,10 @@ use crate::ros::input::{BusTick, CanFrame};
 use crate::topic::{CAN_FRAMES, CAN_TICKS, INPUT, LIMITS, Topic, VEHICLES};
 use crate::writer::GAP_RECORD;
 
+/// Record of names and values about the bus, and its key of what the driver is set up with.
+pub(crate) const BUS_RECORD: &str = "bus";
+pub(crate) const DRIVER_KEY: &str = "driver";
+
 /// What a recording says about its run.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct About {
@@ -31,6 +35,12 @@ impl About {
     #[must_use]
     pub fn value(&self, record: &str, key: &str) -> Option<&str> {
         self.metadata.get(record)?.get(key).map(String::as_str)
+    }
+
+    /// What the truck's driver on its bus was set up with (JSON); none: it was not driven over one.
+    #[must_use]
+    pub fn driver_json(&self) -> Option<&str> {
+        self.value(BUS_RECORD, DRIVER_KEY)
     }
 
     /// An attached text.

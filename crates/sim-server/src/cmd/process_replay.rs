@@ -17,7 +17,7 @@ use tractrix_core::{Command, PoseSource, Time, Vehicle, VehicleLimits};
 
 use self::compare::{Comparison, Difference};
 use self::recorded::{AsRecorded, RecordedBus, RecordedPose, RecordedTraffic, RecordedVehicle};
-use self::setup::{Setup, bus_rate};
+use self::setup::{Setup, driver_setup};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Stages;
@@ -115,9 +115,9 @@ fn replay(args: &Args, stages: &Stages) -> Result<(Provenance, Comparison), Fail
                 let driver = match args.from {
                     From::Ego => None,
                     From::Frames => {
-                        let (bus, rate) = (RecordedBus::default(), bus_rate(&args.file, &about)?);
-                        let pose = RecordedPose::of(&step);
-                        let driver = sim::bus_driver(bus, rate, pose, (*limits).clone());
+                        let (bus, pose) = (RecordedBus::default(), RecordedPose::of(&step));
+                        let setup = driver_setup(&args.file, &about)?;
+                        let driver = setup.driver(bus, pose, (*limits).clone());
                         Some(driver.map_err(Failure::input)?)
                     }
                 };
@@ -198,6 +198,7 @@ fn begin(driver: &mut Driver, call: BusCall) {
         DriverWish::None => {}
         DriverWish::Engage => driver.engage(),
         DriverWish::Disengage => driver.disengage(call.now),
+        DriverWish::Stop => driver.stop(call.now),
     }
     driver.bus().begin(call);
 }

@@ -2,13 +2,11 @@
 
 use j1939::Frame;
 use j1939::bus::{Bus, BusError};
-use recording::{BusCall, GivenStep, RawFrame};
+use recording::{BusCall, GivenStep};
 use tractrix_core::{
-    Command, EgoState, Pose, PoseSource, Scene, Stamped, Time, TrafficSource, Vehicle,
+    Command, EgoState, Pose, PoseSource, RawFrame, Scene, Stamped, Time, TrafficSource, Vehicle,
     VehicleLimits, VehicleStatus,
 };
-
-use crate::bus_record;
 
 /// It failed in the run as well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -89,7 +87,7 @@ impl RecordedBus {
 
 impl Bus for RecordedBus {
     fn send(&mut self, _now: Time, frame: &Frame) -> Result<(), BusError> {
-        let frame = bus_record::raw(frame);
+        let frame = RawFrame::from(frame);
         let rest = self.call.sent.iter().enumerate().skip(self.sent);
         // A frame that failed has lost its identifier to the class of its failure
         let alike = |sent: &recording::SentFrame| match sent.trouble {
@@ -101,7 +99,7 @@ impl Bus for RecordedBus {
             return Ok(());
         };
         self.sent = index + 1;
-        sent.trouble.map_or(Ok(()), |trouble| Err(bus_record::failure(trouble)))
+        sent.trouble.map_or(Ok(()), |trouble| Err(trouble.into()))
     }
 
     fn receive(&mut self, _now: Time) -> Result<Option<Stamped<Frame>>, BusError> {
@@ -109,9 +107,9 @@ impl Bus for RecordedBus {
         self.received += 1;
         match heard {
             None => Ok(None),
-            Some(Err(trouble)) => Err(bus_record::failure(*trouble)),
+            Some(Err(trouble)) => Err((*trouble).into()),
             Some(Ok(Stamped { time, value })) => {
-                Ok(Some(Stamped { time: *time, value: bus_record::frame(value) }))
+                Ok(Some(Stamped { time: *time, value: (*value).into() }))
             }
         }
     }

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use j1939::BitRate;
+use j1939::truck::DriverSetup;
 use planner::{Stack, StackConfig};
 use recording::About;
 use road::Road;
@@ -12,7 +12,6 @@ use toml::{Table, Value};
 use tractrix_core::VehicleLimits;
 
 use super::Args;
-use crate::bus_record::{self, RATE_KEY, SETUP_KEY};
 use crate::failure::Failure;
 use crate::output;
 use crate::provenance::GIT_REVISION;
@@ -52,14 +51,18 @@ impl Setup {
             ),
             None => None,
         };
-        let road = match (&args.road, &scenario, about.value("run", "road")) {
-            (Some(name), ..) => Road::load(name).map_err(Failure::input)?,
-            (None, Some(scenario), _) => scenario.load_road().map_err(Failure::input)?,
-            (None, None, Some(name)) => Road::load(name).map_err(Failure::input)?,
-            (None, None, None) => return Err(lacks("road in its record `run`")),
+        let driven = about.value("run", "road");
+        let road = match (&args.road, about.text("road.xodr"), &scenario, driven) {
+            (Some(name), ..) => Road::load(name),
+            (None, Some(text), ..) => Road::from_xodr(driven.unwrap_or("road.xodr"), text),
+            (None, None, Some(scenario), _) => Ok(scenario.load_road().map_err(Failure::input)?),
+            (None, None, None, Some(name)) => Road::load(name),
+            (None, None, None, None) => return Err(lacks("road in its record `run`")),
         };
+        let road = road.map_err(Failure::input)?;
         let found = sim::road_fingerprint(&road);
         match about.value("run", "road_fingerprint") {
+            None if args.road.is_none() && about.text("road.xodr").is_some() => {}
             None => output::note("the recording cannot tell whether the road is still the same"),
             Some(driven) if driven == found => {}
             Some(driven) => {
@@ -95,22 +98,17 @@ impl Setup {
     }
 }
 
-/// The bit rate of the bus in a recording, whose driver must be set up as ours is.
+/// What the truck's driver on its bus was set up with.
 ///
 /// # Errors
-/// [`Failure::Input`] if it was not driven over a bus, or otherwise.
-pub(super) fn bus_rate(file: &Path, about: &About) -> Result<BitRate, Failure> {
-    let rate = about.value("bus", RATE_KEY).and_then(bus_record::bit_rate);
-    let Some(rate) = rate else {
+/// [`Failure::Input`] if it was not driven over a bus, or by another version.
+pub(super) fn driver_setup(file: &Path, about: &About) -> Result<DriverSetup, Failure> {
+    let Some(json) = about.driver_json() else {
         let why = "it has no frames of a bus (run --vehicle bus); use --from ego";
         return Err(Failure::file(file, why));
     };
-    let (was, is) = (about.value("bus", SETUP_KEY).unwrap_or("unknown"), sim::bus_driver_setup());
-    if was != is {
-        let why = format!("what drove the truck over its bus was set up as {was}, now it is {is}");
-        return Err(Failure::file(file, why));
-    }
-    Ok(rate)
+    let wrong = |e| Failure::file(file, format!("what drove the truck is not understood: {e}"));
+    serde_json::from_str(json).map_err(wrong)
 }
 
 /// Puts `KEY=VALUE` into a configuration, where the key is there already.

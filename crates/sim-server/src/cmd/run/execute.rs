@@ -161,15 +161,17 @@ fn start_recording(
         ("road_fingerprint".to_owned(), sim::road_fingerprint(world.road())),
         ("started_unix_s".to_owned(), format!("{:.3}", started.as_secs_f64())),
     ]);
-    let scenario_toml = Some(toml::to_string(scenario).map_err(Failure::work)?);
-    let stack_toml = toml::to_string(world.stack().config()).map_err(Failure::work)?;
+    let files = BTreeMap::from([
+        ("scenario.toml", toml::to_string(scenario).map_err(Failure::work)?),
+        ("stack.toml", toml::to_string(world.stack().config()).map_err(Failure::work)?),
+    ]);
     let road = Arc::clone(world.road());
     let geodesy = Geodesy::of(&road).unwrap_or_else(|why| {
         output::note(&format!("{}: {why}: no /fix in the recording", road.name()));
         None
     });
     let scenery = Scenery { road, combination, geodesy };
-    let header = RunHeader { metadata, scenario_toml, stack_toml, scenery, bus };
+    let header = RunHeader { metadata, files, scenery, bus };
     Ok(Recording::create(&out.begin("run.mcap")?, header, Backlog::Wait)?)
 }
 

@@ -1,15 +1,13 @@
 //! From options to the scenario that is driven.
 
-use std::collections::BTreeMap;
-
 use j1939::BitRate;
 use j1939::bus::Bus;
 use j1939::bus::loopback::Loopback;
+use j1939::bus::tap::Tap;
 use recording::{BusHeader, BusTrace, DriverWish};
 use sim::{Overrides, Scenario, World};
 
 use super::Args;
-use crate::bus_record;
 use crate::failure::Failure;
 
 /// The scenario with the command line's changes.
@@ -66,14 +64,10 @@ pub(super) fn connect(world: &mut World, vehicle: &str) -> Result<Option<BusHead
         }
     };
     let trace = BusTrace::default();
-    world.put_on_bus(rate, ecu, bus_record::tapped(driver, &trace)).map_err(Failure::work)?;
+    let tapped = Box::new(Tap::new(driver, trace.clone()));
+    world.put_on_bus(rate, ecu, tapped).map_err(Failure::work)?;
     // The truck's driver was asked to drive at the end of the warm-up
     trace.wished(DriverWish::Engage);
-    let name = vehicle.rsplit([':', '/']).next().unwrap_or(vehicle).to_owned();
-    let metadata = BTreeMap::from([
-        ("vehicle".to_owned(), vehicle.to_owned()),
-        (bus_record::RATE_KEY.to_owned(), bus_record::rate_kbit_s(rate).to_string()),
-        (bus_record::SETUP_KEY.to_owned(), sim::bus_driver_setup()),
-    ]);
-    Ok(Some(BusHeader { name, metadata, trace }))
+    let driver_json = serde_json::to_string(&sim::bus_driver_setup(rate)).map_err(Failure::work)?;
+    Ok(Some(BusHeader { vehicle: vehicle.to_owned(), driver_json, trace }))
 }
