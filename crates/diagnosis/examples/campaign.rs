@@ -1,17 +1,23 @@
 //! Hides effects in generated drives and counts what the diagnosis makes of them:
 //! `campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,channel] [only=cause]
-//! [from=CASE] [to=CASE] [cases=N,N,...] [dump=DIR]`, KIND one of `clean`, `small`, `medium`,
-//! `large`, `pairs`, `outside`, `deleted`. One line per case (`.` exact, `+` first right, `-` nothing, `X` wrong),
-//! then the table.
+//! [from=CASE] [to=CASE] [cases=N,N,...] [dump=DIR] [family=1|2]`, KIND one of `clean`, `small`,
+//! `medium`, `large`, `pairs`, `outside`, `deleted`. Two lines per case, one for people (`.` exact,
+//! `+` first right, `-` nothing, `X` wrong) and one of JSON, then the table. `family=2` takes shapes,
+//! driver, roads and noise that were written apart (`tests/support/second`).
+//! `campaign calibration FILE...` pools the outputs of runs.
 #![expect(
     clippy::disallowed_macros,
     clippy::disallowed_methods,
     reason = "an example prints and takes times"
 )]
 
+#[path = "campaign/calibration.rs"]
+mod calibration;
 #[allow(dead_code, reason = "each user of the generator needs a part of it")]
 #[path = "../tests/support/mod.rs"]
 mod support;
+#[path = "campaign/truth.rs"]
+mod truth;
 
 use std::path::Path;
 
@@ -24,9 +30,10 @@ use rand_chacha::ChaCha8Rng;
 use support::effects::{Effect, Magnitude, SIZES, Shape, hide};
 use support::outside::OUTSIDE;
 use support::random::{between, sign};
-use support::{Campaign, generate_apart};
+use support::second::outside::SECOND_OUTSIDE;
+use support::{Campaign, generate_apart, second};
 
-const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR]";
+const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR] [family=1|2]\n       campaign calibration FILE...";
 
 #[derive(Default)]
 struct Table {
@@ -71,42 +78,6 @@ const ON_SPEED: [&str; 17] = [
     "hidden_retarder",
     "speed_scale",
 ];
-
-/// Key and value in `diagnosis.json` of a hidden size; `None` where the hidden shape has another
-/// parameter than the catalogue's.
-fn expected(id: &str, size: f64) -> Option<(&'static str, f64)> {
-    Some(match id {
-        "rolling_resistance" => ("coefficient_scale", 1.0 + size),
-        "air_drag" => ("cd_a_scale", 1.0 + size),
-        "headwind" => ("headwind_m_s", size),
-        "mass" => ("mass_scale", 1.0 + size),
-        // The map's error; the diagnosis states what the map must be corrected by.
-        "grade_bias" => ("grade_frac", -size),
-        "map_shift" => ("shift_m", -size),
-        "tyre_warmup" => ("cold_extra_frac", size),
-        "driveline_loss" => ("extra_loss_frac", size),
-        "fan_load" => ("fan_power_kw", size),
-        "dragging_brake" => ("force_n", size),
-        "engine_friction" => ("friction_scale", 1.0 + size),
-        "turbo_lag" | "steering_lag" => ("lag_s", size),
-        "pedal_delay" | "brake_delay" => ("delay_s", size),
-        "shift_duration" => ("extra_time_s", size),
-        "brake_gain" => ("gain_scale", 1.0 + size),
-        "engine_brake_torque" => ("torque_scale", 1.0 + size),
-        "speed_scale" => ("scale", 1.0 + size),
-        "yaw_rate_bias" => ("bias_rad_s", size),
-        "steering_ratio" => ("ratio_scale", 1.0 + size),
-        "steering_offset" => ("offset_rad", size),
-        "steering_free_play" => ("free_play_rad", size),
-        "cornering_stiffness_front"
-        | "cornering_stiffness_drive"
-        | "cornering_stiffness_trailer" => ("stiffness_scale", 1.0 + size),
-        "payload_position" => ("shift_rearward_m", size),
-        "road_bank" => ("bank_rad", size),
-        "crosswind" => ("wind_to_left_m_s", size),
-        _ => return None,
-    })
-}
 
 /// Writes drives as `diagnose` reads them.
 fn dump(set: &DriveSet, folder: &Path) -> std::io::Result<()> {
@@ -159,7 +130,13 @@ fn line(d: &Diagnosis) -> String {
 }
 
 /// What is hidden in a case of a kind.
-fn draw(kind: &str, case: usize, only: Option<&str>, rng: &mut ChaCha8Rng) -> Option<Vec<Effect>> {
+fn draw(
+    kind: &str,
+    family: u32,
+    case: usize,
+    only: Option<&str>,
+    rng: &mut ChaCha8Rng,
+) -> Option<Vec<Effect>> {
     let single = |m: Magnitude, rng: &mut ChaCha8Rng| {
         let id = only.unwrap_or(SIZES[case % SIZES.len()].0);
         hide(id, m, rng).map(|e| vec![e])
@@ -178,6 +155,11 @@ fn draw(kind: &str, case: usize, only: Option<&str>, rng: &mut ChaCha8Rng) -> Op
                 hide(SIZES[i].0, m, rng)
             };
             Some([either(a)?, either(b)?].into())
+        }
+        "outside" if family == 2 => {
+            let &(kind, usual, either, _) = &SECOND_OUTSIDE[case % SECOND_OUTSIDE.len()];
+            let size = if either { sign(rng) } else { 1.0 } * usual * between(rng, 0.7, 1.3);
+            Some(vec![Effect::SecondOutside { kind, size, shape: Shape::draw(rng) }])
         }
         "outside" => {
             let o = &OUTSIDE[case % OUTSIDE.len()];
@@ -224,28 +206,26 @@ impl Table {
         );
         self.unknown += usize::from(d.verdict == Verdict::Unknown);
         self.unsure += usize::from(d.verdict != Verdict::Explained);
-        let mut right = false;
-        if let Some(Effect::Outside { kind, .. }) = hidden.first()
-            && let (Some(o), Some(u)) = (OUTSIDE.iter().find(|o| o.0 == *kind), &d.unknown)
-        {
-            right =
-                u.signals.first().is_some_and(|s| o.3.contains(s)) && d.verdict == Verdict::Unknown;
-            self.signal += usize::from(right);
-        }
+        let counts = match hidden.first() {
+            Some(Effect::Outside { kind, .. }) => {
+                OUTSIDE.iter().find(|o| o.0 == *kind).map(|o| o.3)
+            }
+            Some(Effect::SecondOutside { kind, .. }) => {
+                SECOND_OUTSIDE.iter().find(|o| o.0 == *kind).map(|o| o.3)
+            }
+            _ => None,
+        };
+        let first_signal = d.unknown.as_ref().and_then(|u| u.signals.first());
+        let right = d.verdict == Verdict::Unknown
+            && counts.zip(first_signal).is_some_and(|(c, s)| c.contains(s));
+        self.signal += usize::from(right);
         let stated = d.causes.iter().map(|c| (c.probability, truth.contains(&c.id)));
         self.stated.extend(stated.filter(|_| !deleted));
         let mut off = String::new();
-        for e in hidden {
-            if let Effect::Cause { id, size, .. } = e
-                && let Some(c) = d.causes.iter().find(|c| c.id == *id)
-                && let Some((key, value)) = expected(id, *size)
-                && let Some(p) = c.parameters.get(key)
-            {
-                let z = (p.value - value) / p.sigma;
-                self.intervals += 1;
-                self.covered += usize::from(z.abs() <= 1.645);
-                off += &format!(" z={z:.1}");
-            }
+        for i in truth::intervals(hidden, d) {
+            self.intervals += 1;
+            self.covered += usize::from(i.covers());
+            off += &format!(" z={:.1}", i.off());
         }
         if let Some(g) = &d.gain {
             self.gains += 1;
@@ -320,6 +300,9 @@ fn named(hidden: &[Effect]) -> String {
     let words = hidden.iter().map(|e| match e {
         Effect::Cause { id, size, shape } => format!("{id} {size:.4} {:.2?}", shape.0),
         Effect::Outside { kind, size, shape } => format!("{kind:?} {size:.4} {:.2?}", shape.0),
+        Effect::SecondOutside { kind, size, shape } => {
+            format!("{kind:?} {size:.4} {:.2?}", shape.0)
+        }
     });
     words.collect::<Vec<_>>().join(" & ")
 }
@@ -335,6 +318,15 @@ fn stays_on_the_road(set: &DriveSet) -> bool {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let kind = arguments.first().ok_or(USAGE)?.as_str();
+    if kind == "calibration" {
+        let mut cases = Vec::new();
+        for file in arguments.get(1..).filter(|f| !f.is_empty()).ok_or(USAGE)? {
+            let text = std::fs::read_to_string(file).map_err(|e| format!("{file}: {e}"))?;
+            cases.extend(calibration::read(&text).map_err(|e| format!("{file}: {e}"))?);
+        }
+        print!("{}", calibration::report(&cases));
+        return Ok(());
+    }
     let count: usize = arguments.get(1).ok_or(USAGE)?.parse()?;
     let seed: u64 = arguments.get(2).ok_or(USAGE)?.parse()?;
     let option = |key: &str| arguments.iter().find_map(|a| a.strip_prefix(key));
@@ -349,20 +341,26 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let case = case.to_string();
         option("cases=").is_none_or(|list| list.split(',').any(|c| c == case))
     };
+    let family: u32 = option("family=").map_or(Ok(1), str::parse)?;
+    let generate = match family {
+        1 => generate_apart,
+        2 => second::generate,
+        _ => return Err(USAGE.into()),
+    };
     let (from, to) = (number("from=", 0)?, number("to=", usize::MAX)?);
     let plant = Plant::of_truck(&TruckParameters::load("reference")?)?;
     let usual = Campaign { drives: 8, ..campaign };
-    let clean = generate_apart(&[], &usual, seed.wrapping_mul(7919) + 1);
+    let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
     let baseline = Baseline::learn(&plant, &clean, &Serial)?;
     let mut t = Table::default();
     for case in 0..count.min(to) {
         let case_seed = seed.wrapping_mul(1_000_003) + case as u64;
         let mut rng = ChaCha8Rng::seed_from_u64(case_seed ^ 0x5eed);
-        let hidden = draw(kind, case, option("only="), &mut rng).ok_or(USAGE)?;
+        let hidden = draw(kind, family, case, option("only="), &mut rng).ok_or(USAGE)?;
         if case < from || !listed(case) {
             continue;
         }
-        let mut set = generate_apart(&hidden, &campaign, case_seed);
+        let mut set = generate(&hidden, &campaign, case_seed);
         if let Some(without) = option("without=") {
             for name in without.split(',') {
                 let channel = Channel::of(name).ok_or_else(|| format!("no channel {name}"))?;
@@ -385,7 +383,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 .iter()
                 .filter_map(|e| match e {
                     Effect::Cause { id, .. } => Some((*id).to_owned()),
-                    Effect::Outside { .. } => None,
+                    Effect::Outside { .. } | Effect::SecondOutside { .. } => None,
                 })
                 .collect();
         }
@@ -396,12 +394,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         // The same roads, loads, weather and tolerances without what is hidden: the error that is
         // left there is what the true model leaves.
         let oracle = d.gain.as_ref().filter(|_| kind != "outside").map(|g| {
-            let twin = generate_apart(&[], &campaign, case_seed);
+            let twin = generate(&[], &campaign, case_seed);
             let held = twin.drives.iter().filter(|d| g.held_out.contains(&d.name));
             baseline.speed_rmse_m_s(&plant, held)
         });
         let (mark, off) = t.count(&hidden, &d, deleted, oracle);
         println!("{mark} {case} {} | {seconds:.1} s {}{off}", named(&hidden), line(&d));
+        let record = calibration::Case::of((family, kind, seed, case), &hidden, &d);
+        println!("{}", serde_json::to_string(&record)?);
     }
     t.print(kind, seed);
     Ok(())

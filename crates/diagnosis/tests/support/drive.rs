@@ -129,6 +129,8 @@ pub(crate) fn drive(
                 Effect::Outside { kind, size, shape } => {
                     outside::act(&mut a, &mut memory, (*kind, *size, shape), &now, rng, STEP_S);
                 }
+                // Acts in drives of its own family.
+                Effect::SecondOutside { .. } => {}
             }
         }
         // Engine and gearbox.

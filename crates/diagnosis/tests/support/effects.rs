@@ -6,6 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::outside::Outside;
 use super::random::{between, sign};
+use super::second::outside::SecondOutside;
 use super::sheet::{AXLE, Figures, RADIUS_M, engine_brake, full_load};
 
 /// What is wrong with the truck, beyond its tolerances.
@@ -15,6 +16,8 @@ pub(crate) enum Effect {
     Cause { id: &'static str, size: f64, shape: Shape },
     /// An effect that the catalogue does not have.
     Outside { kind: Outside, size: f64, shape: Shape },
+    /// The same in the second family of drives.
+    SecondOutside { kind: SecondOutside, size: f64, shape: Shape },
 }
 
 /// How an effect looks beyond its size: four numbers between 0 and 1.

@@ -12,6 +12,7 @@ pub(crate) mod logger;
 pub(crate) mod outside;
 pub(crate) mod random;
 pub(crate) mod road;
+pub(crate) mod second;
 pub(crate) mod sheet;
 
 use diagnosis::{Drive, DriveSet};
