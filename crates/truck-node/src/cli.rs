@@ -47,9 +47,13 @@ pub(crate) struct Args {
     #[arg(long, requires = "out")]
     pub(crate) overwrite: bool,
     /// Drives as soon as all checks are passed, once: after the driver has taken over it only
-    /// listens.
+    /// listens, until --control asks again.
     #[arg(long)]
     pub(crate) engage_after_checks: bool,
+    /// A Unix socket, made here: who may open it writes a line, engage or disengage, and reads who
+    /// drives then. Nothing else hands the truck over again.
+    #[arg(long, value_name = "SOCKET")]
+    pub(crate) control: Option<PathBuf>,
     /// The checks must be passed within this time.
     #[arg(long, value_name = "S", default_value = "60", value_parser = positive)]
     pub(crate) ready_within: f64,

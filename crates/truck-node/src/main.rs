@@ -12,12 +12,14 @@
 //! | `pose`, `nmea` | where the truck is |
 //! | `log` | the recording |
 //! | `watchdog`, `health` | who watches the program |
+//! | `control` | the driver's wish to hand over, or to drive himself |
 //!
 //! A shell: it owns clock, signals, sockets and files. What decides is in the crates that it links.
 
 mod checks;
 mod cli;
 mod clock;
+mod control;
 mod failure;
 mod health;
 mod live;

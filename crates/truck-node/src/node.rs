@@ -17,6 +17,7 @@ use tractrix_core::{Command, EgoState, Stamped, Time, Vehicle};
 use crate::checks::{Checks, Report, word};
 use crate::cli::{Args, Pose, bus_name};
 use crate::clock::Clock;
+use crate::control::{Asked, Control};
 use crate::failure::Failure;
 use crate::health::Health;
 use crate::live::Live;
@@ -98,6 +99,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     };
     let watchdog = Watchdog::open(args.watchdog.as_deref())?;
     let health = args.health.map(Health::bind).transpose()?;
+    let control = args.control.as_deref().map(Control::bind).transpose()?;
     if let Some(folder) = &args.out {
         log::free(folder, args.overwrite)?;
     }
@@ -127,6 +129,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         checks,
         watchdog,
         health,
+        control,
         asked_to_end,
         phase: Phase::Checking,
         wish: DriverWish::None,
@@ -153,6 +156,7 @@ struct Node<'a> {
     checks: Checks,
     watchdog: Watchdog,
     health: Option<Health>,
+    control: Option<Control>,
     asked_to_end: Arc<AtomicBool>,
     phase: Phase,
     /// What is wished of the truck's driver at the beginning of the next tick.
@@ -185,6 +189,7 @@ impl Node<'_> {
             self.figures.ticks += 1;
             self.figures.longest = self.figures.longest.max(took);
             self.watch(now);
+            self.hear(now);
             due += self.tick;
             // What is late is not made up for: the next tick is the next on the grid
             while due + self.tick < self.clock.elapsed() {
@@ -342,6 +347,32 @@ impl Node<'_> {
         if let Some(health) = self.health.take() {
             health.serve(|| self.state(now));
             self.health = Some(health);
+        }
+    }
+
+    /// Hears who wishes to hand over or to drive himself, and says in the next tick what came of it.
+    fn hear(&mut self, now: Time) {
+        let Some(mut control) = self.control.take() else { return };
+        if control.waits() {
+            control.answer(name_of(self.truck.engagement()));
+        } else if let Some(asked) = control.asked(self.clock.elapsed()) {
+            match self.consider(now, asked) {
+                Ok(wish) => self.wish = wish,
+                Err(why) => control.answer(&format!("refused: {why}")),
+            }
+        }
+        self.control = Some(control);
+    }
+
+    /// Engaging again needs what engaging first did: all the checks.
+    fn consider(&mut self, now: Time, asked: Asked) -> Result<DriverWish, String> {
+        match (self.phase, asked) {
+            (_, Asked::Disengage) => Ok(DriverWish::Disengage),
+            (Phase::Running, Asked::Engage) => {
+                let report = self.look(now).map_err(|failure| failure.to_string())?;
+                if report.is_ready() { Ok(DriverWish::Engage) } else { Err(report.missing()) }
+            }
+            (phase, Asked::Engage) => Err(phase.name().to_owned()),
         }
     }
 

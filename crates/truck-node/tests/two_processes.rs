@@ -4,8 +4,16 @@
 
 mod support;
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::net::TcpStream;
+use std::os::unix::net::UnixStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use j1939::bus::Bus;
+use j1939::bus::loopback::LoopbackNode;
+use j1939::{Frame, Id};
+use tractrix_core::Time;
 
 use support::{Files, Wire, number_after, sim_server};
 
@@ -66,6 +74,75 @@ fn assert_same_again(file: &str, from: &str) {
     assert_eq!((replayed.status.code(), &report["ticks_different"]), (Some(0), &0.into()));
     assert!(report["ticks_compared"].as_u64().unwrap() > 300, "{report}");
     assert!(!errors.contains("cannot tell"), "{errors}");
+}
+
+/// The driver's foot on the accelerator, as the cab's control unit tells it right after the engine
+/// has told of a pedal that nobody touches.
+fn foot(presses: Arc<AtomicBool>) -> impl FnMut(Time, &mut LoopbackNode) + Send + 'static {
+    move |now, bus| {
+        while let Some(heard) = bus.receive(now).unwrap() {
+            let is_eec2 = heard.value.id().raw() == 0x0CF0_0300;
+            if is_eec2 && presses.load(Ordering::Relaxed) {
+                let half = [0xFF, 125, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF];
+                bus.send(now, &Frame::of(Id::from_raw(0x0CF0_0331), half)).unwrap();
+            }
+        }
+    }
+}
+
+/// What is answered to a word.
+fn told(control: &str, word: &str) -> String {
+    let mut stream = UnixStream::connect(control).unwrap();
+    writeln!(stream, "{word}").unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    answer.trim().to_owned()
+}
+
+#[test]
+fn who_has_taken_over_keeps_the_truck_until_he_hands_it_over_again() {
+    let presses = Arc::new(AtomicBool::new(false));
+    let wire = Wire::with(foot(Arc::clone(&presses)));
+    let files = Files::new(3.0);
+    let (out, health, control) = (files.path("out"), free_address(), files.path("control"));
+    let mut truck = files.truck(&wire.name);
+    truck.until("is held until it is driven");
+    let words = ["--out", &out, "--health", &health, "--control", &control];
+    let mut node = files.node(&wire.name, &words);
+    node.until("ready");
+    // not asked for by anybody so far
+    assert_eq!(told(&control, "engage"), "engaged");
+    node.until("engaged");
+    assert_eq!(told(&control, "nonsense"), "engage or disengage, and a new line");
+    presses.store(true, Ordering::Relaxed);
+    node.until("override");
+    let refused = told(&control, "engage");
+    assert!(refused != "engaged", "the foot is on the pedal: {refused}");
+    presses.store(false, Ordering::Relaxed);
+    node.until("ready");
+    let driven = |state: &serde_json::Value| state["driven_ticks"].as_u64().unwrap();
+    let before = state_of(&health);
+    let over_s = before["time_s"].as_f64().unwrap() + 1.0;
+    let after = loop {
+        let state = state_of(&health);
+        assert_eq!(state["engagement"], "ready", "{state}");
+        if state["time_s"].as_f64().unwrap() > over_s {
+            break state;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    };
+    assert_eq!(driven(&before), driven(&after), "nobody has asked for it");
+    assert_eq!(told(&control, "engage"), "engaged");
+    node.until("engaged");
+    assert_eq!(told(&control, "disengage"), "ready");
+    assert!(driven(&state_of(&health)) > driven(&after));
+    node.terminate();
+    let (status, said) = node.end();
+    assert_eq!(status.code(), Some(0), "{said}");
+    truck.terminate();
+    assert_eq!(truck.end().0.code(), Some(0));
+    assert!(!std::path::Path::new(&control).exists());
+    assert_same_again(&format!("{out}/run.mcap"), "frames");
 }
 
 /// A free port of this machine; somebody else may take it, but nobody here does.
