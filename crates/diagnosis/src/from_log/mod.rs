@@ -24,7 +24,7 @@ use serde::Serialize;
 
 pub use choose::{Choice, Unfilled};
 pub use collect::Log;
-pub use place::Locate;
+pub use place::{Locate, OnRoad};
 pub use trips::Span;
 
 use crate::{Channel, DiagnosisError, Drive};
@@ -45,8 +45,8 @@ pub struct Conversion<'a> {
     pub standstill_s: f64,
     /// Shorter drives are left out, s.
     pub least_s: f64,
-    /// Where fixes are on the road that was driven, if there is a map of it.
-    pub locate: Option<Locate<'a>>,
+    /// Where on the road that was driven it is, if there is a map of it.
+    pub road: Option<OnRoad<'a>>,
 }
 
 /// A drive out of a log.
@@ -129,7 +129,12 @@ impl Log {
             longitude: choose(log, What::Longitude),
         };
         let (mut drives, mut left_out) = (Vec::new(), Vec::new());
+        let mut road = how.road;
         for span in spans {
+            let driven = drive(span, &columns, &others, how.fuel_density_kg_m3, road);
+            if let Some(OnRoad::From { start_m, .. }) = &mut road {
+                *start_m += driven.distance_m;
+            }
             if span.duration_s() < how.least_s {
                 let why = format!(
                     "{:.0} s of driving, shorter than {} s",
@@ -138,7 +143,7 @@ impl Log {
                 );
                 left_out.push(LeftOut { span, why });
             } else {
-                drives.push(drive(span, &columns, &others, how));
+                drives.push(driven);
             }
         }
         Ok(Converted {
@@ -165,7 +170,8 @@ fn drive(
     span: Span,
     chosen: &[(Channel, Chosen<'_>)],
     others: &Others<'_>,
-    how: &Conversion<'_>,
+    fuel_density_kg_m3: f64,
+    road: Option<OnRoad<'_>>,
 ) -> LoggedDrive {
     let rows = (span.duration_s() / STEP_S) as usize + 1;
     let times: Vec<f64> = (0..rows).map(|k| span.from_s + STEP_S * k as f64).collect();
@@ -176,7 +182,7 @@ fn drive(
         let mut values: Vec<f64> = times.iter().map(|&t| source.at(t)).collect();
         match channel {
             Channel::FuelRateGS => {
-                values.iter_mut().for_each(|v| *v *= 1e3 * how.fuel_density_kg_m3);
+                values.iter_mut().for_each(|v| *v *= 1e3 * fuel_density_kg_m3);
             }
             Channel::HeadingRad => unwrap(&mut values),
             Channel::AcceleratorPedalFrac => {
@@ -193,8 +199,12 @@ fn drive(
     let distance_m = way_m.last().copied().unwrap_or(0.0);
     let altitude = column(Channel::GpsAltitudeM).cloned();
     let mut on_map = false;
-    if let Some(locate) = how.locate {
-        match place::stations_m(&way_m, &fixes(&times, others), locate) {
+    if let Some(road) = road {
+        let stations_m = match road {
+            OnRoad::Fixes(locate) => place::stations_m(&way_m, &fixes(&times, others), locate),
+            OnRoad::From { start_m, length_m } => place::by_wheels_m(&way_m, start_m, length_m),
+        };
+        match stations_m {
             Ok(stations_m) => {
                 on_map = true;
                 columns.push((Channel::SMapM.name(), stations_m));

@@ -1,4 +1,5 @@
-//! Where on a map a drive was: satellite fixes on the road, the wheels between them.
+//! Where on a map a drive was: satellite fixes on the road and the wheels between them, or the wheels
+//! alone from a place that somebody states.
 
 /// Fixes on both sides that say together how far the wheels are off.
 const EACH_SIDE: usize = 15;
@@ -9,6 +10,34 @@ const LEAST_ON_ROAD_FRAC: f64 = 0.8;
 /// Where a fix, latitude and longitude in deg, is on the road, m; `None`: off it. The last argument
 /// is where the truck was before.
 pub type Locate<'a> = &'a dyn Fn(f64, f64, Option<f64>) -> Option<f64>;
+
+/// How the place on a road is told.
+#[derive(Clone, Copy)]
+pub enum OnRoad<'a> {
+    /// By satellite fixes.
+    Fixes(Locate<'a>),
+    /// By the wheels: the log's first drive begins at a station, the next where the last one ended.
+    From {
+        /// Station of the first drive's first row, m.
+        start_m: f64,
+        /// Length of the road, m.
+        length_m: f64,
+    },
+}
+
+/// Stations of rows by the wheels, m. An error of the speed adds up: 1 % is 10 m after a kilometre.
+///
+/// # Errors
+/// The drive is longer than what is left of the road.
+pub(super) fn by_wheels_m(way_m: &[f64], start_m: f64, length_m: f64) -> Result<Vec<f64>, String> {
+    let end_m = start_m + way_m.last().copied().unwrap_or(0.0);
+    if end_m > length_m {
+        return Err(format!(
+            "from {start_m:.0} m the wheels come to {end_m:.0} m, the road ends at {length_m:.0} m"
+        ));
+    }
+    Ok(way_m.iter().map(|way| start_m + way).collect())
+}
 
 /// Stations of rows, m. `way_m` is what the wheels count at the rows; `fixes` are row number,
 /// latitude and longitude, deg.
@@ -83,6 +112,14 @@ mod tests {
             .map(|(a, b)| (a - b).abs())
             .fold(0.0, f64::max);
         assert!(worst < 1.0, "{worst}");
+    }
+
+    #[test]
+    fn wheels_count_from_a_stated_start_to_the_end_of_the_road() {
+        let way = [0.0, 1.0, 2.5];
+        assert_eq!(by_wheels_m(&way, 500.0, 502.5).unwrap(), [500.0, 501.0, 502.5]);
+        let why = by_wheels_m(&way, 500.0, 502.0).unwrap_err();
+        assert!(why.contains("ends at 502 m"), "{why}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Parser, Subcommand};
 use diagnosis::from_log::{
-    Choice, Conversion, Converted, LeftOut, Log, LoggedDrive, Span, Unfilled,
+    Choice, Conversion, Converted, LeftOut, Log, LoggedDrive, OnRoad, Span, Unfilled,
 };
 use dynamics::{TruckModel, TruckParameters};
 use planner::localise::MapProjection;
@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::diagnose::folder::{self, Table};
 use crate::bus_log;
-use crate::cli::positive;
+use crate::cli::{not_negative, positive};
 use crate::failure::Failure;
 use crate::out_folder::{Out, OutFolder};
 use crate::output;
@@ -46,6 +46,10 @@ pub(crate) struct Args {
     /// The road that was driven; satellite fixes (VP1) say where on it.
     #[arg(long, value_name = "ROAD")]
     map: Option<String>,
+    /// Where on the road the first drive of every log begins: from there the wheels count. For roads
+    /// that do not say where on earth they lie.
+    #[arg(long, value_name = "M", requires = "map", value_parser = not_negative)]
+    start_s_m: Option<f64>,
     /// Mass on the load sheet; without it what the bus says (CVW).
     #[arg(long, value_name = "M", value_parser = positive)]
     mass_kg: Option<f64>,
@@ -99,7 +103,7 @@ pub(crate) fn run(command: &Command) -> Result<(), Failure> {
     let truck = TruckParameters::load(&args.truck).map_err(Failure::input)?;
     let model = TruckModel::new(truck, 0.0).map_err(Failure::input)?;
     let limits = model.vehicle_limits().map_err(Failure::input)?;
-    let map = args.map.as_deref().map(Map::load).transpose()?;
+    let map = args.map.as_deref().map(|m| Map::load(m, args.start_s_m)).transpose()?;
     let names = drive_names(&args.logs)?;
     let out = args.out.folder(RESULTS)?;
     let (mut tables, mut logs) = (Vec::new(), Vec::new());
@@ -111,7 +115,10 @@ pub(crate) fn run(command: &Command) -> Result<(), Failure> {
             fuel_density_kg_m3: limits.powertrain.fuel_density_kg_m3,
             standstill_s: args.standstill_s,
             least_s: args.min_drive_s,
-            locate: map.as_ref().map(|_| &locate as diagnosis::from_log::Locate<'_>),
+            road: map.as_ref().map(|map| match args.start_s_m {
+                Some(start_m) => OnRoad::From { start_m, length_m: map.road.length_m() },
+                None => OnRoad::Fixes(&locate),
+            }),
         };
         let made = log.convert(&how).map_err(|e| Failure::file(path, e))?;
         logs.push(put(path, &name, made, args, channels, &mut tables));
@@ -261,23 +268,35 @@ fn sentences(report: &Report<'_>) -> String {
 /// The road that was driven.
 struct Map {
     road: Road,
-    projection: MapProjection,
+    projection: Option<MapProjection>,
 }
 
 impl Map {
-    fn load(name: &str) -> Result<Self, Failure> {
+    fn load(name: &str, start_s_m: Option<f64>) -> Result<Self, Failure> {
         let road = Road::load(name).map_err(Failure::input)?;
+        if let Some(start_m) = start_s_m {
+            if start_m >= road.length_m() {
+                let length_m = road.length_m();
+                return Err(Failure::Input(format!(
+                    "--start-s-m {start_m}: the road ends at {length_m:.0} m"
+                )));
+            }
+            return Ok(Self { road, projection: None });
+        }
         let no_place = || {
-            Failure::Input(format!("--map {name}: the road does not say where on earth it lies"))
+            Failure::Input(format!(
+                "--map {name}: the road does not say where on earth it lies; \
+                 --start-s-m says where on it the drive begins"
+            ))
         };
         let reference = road.geo_reference().ok_or_else(no_place)?;
         let projection = MapProjection::new(reference)
             .map_err(|e| Failure::Input(format!("--map {name}: {e}")))?;
-        Ok(Self { road, projection })
+        Ok(Self { road, projection: Some(projection) })
     }
 
     fn station_m(&self, latitude_deg: f64, longitude_deg: f64, hint_m: Option<f64>) -> Option<f64> {
-        let [x_m, y_m] = self.projection.to_map_m(latitude_deg, longitude_deg);
+        let [x_m, y_m] = self.projection.as_ref()?.to_map_m(latitude_deg, longitude_deg);
         let at = self.road.project(x_m, y_m, hint_m)?;
         (at.d_m.abs() <= OFF_ROAD_M).then_some(at.s_m)
     }
