@@ -22,6 +22,7 @@
 
 mod bounds;
 pub mod catalogue;
+pub mod data_sheet;
 mod ecu;
 pub mod effects;
 mod error;
@@ -29,6 +30,7 @@ pub mod lateral;
 mod model;
 mod output;
 mod parameters;
+mod provenance;
 mod state;
 
 pub use ecu::EcuState;
@@ -37,4 +39,5 @@ pub use error::DynamicsError;
 pub use model::TruckModel;
 pub use output::PaperOutputs;
 pub use parameters::{BodyParameters, Overlay, OverlayValue, TruckParameters};
+pub use provenance::{FigureOrigin, KnownBy, Provenance};
 pub use state::{DelayLine, Forces, MAX_DELAY_S, RoadPatch, SUBSTEP_S, TruckState};

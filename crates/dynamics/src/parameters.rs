@@ -21,6 +21,7 @@ use crate::effects::resistance::ResistanceParameters;
 use crate::effects::shift::ShiftParameters;
 use crate::effects::table::TableEffect;
 use crate::lateral::LateralParameters;
+use crate::provenance::{self, Provenance};
 
 const BUILTIN: [(&str, &str); 5] = [
     ("longhaul", include_str!("../trucks/longhaul.toml")),
@@ -63,6 +64,9 @@ pub struct TruckParameters {
     /// Fitted tables for what no effect explains.
     #[serde(default, rename = "table_effect", skip_serializing_if = "Vec::is_empty")]
     pub table_effects: Vec<TableEffect>,
+    /// Where single figures come from.
+    #[serde(default, skip_serializing_if = "Provenance::is_empty")]
+    pub provenance: Provenance,
 }
 
 /// Outline of the bodies, for gaps, lanes and pictures.
@@ -178,6 +182,7 @@ impl TruckParameters {
     pub fn with_overlay(&self, overlay: &Overlay) -> Result<Self, DynamicsError> {
         let mut truck = self.clone();
         for (path, new) in &overlay.set {
+            truck.provenance.remove(path);
             truck = truck.with_parameter(path, new.value).map_err(|e| match e {
                 DynamicsError::UnknownParameter { path, nearest, .. } => {
                     DynamicsError::UnknownParameter { name: overlay.name.clone(), path, nearest }
@@ -242,6 +247,11 @@ impl TruckParameters {
         violations.extend(self.cooling.iter().flat_map(CoolingParameters::violations));
         violations.extend(self.resistance.violations());
         violations.extend(self.table_effects.iter().flat_map(TableEffect::violations));
+        if !self.provenance.is_empty() {
+            let root = toml::Value::try_from(&self).ok();
+            let names = |path: &str| root.as_ref().is_some_and(|r| is_figure(r, path));
+            violations.extend(provenance::violations(&self.provenance, names));
+        }
         violations.extend(self.lateral.violations().into_iter().map(|v| format!("lateral.{v}")));
         if violations.is_empty() {
             Ok(self)
@@ -267,13 +277,27 @@ fn number_at<'a>(root: &'a mut toml::Value, path: &str) -> Option<&'a mut toml::
     (at.is_float() || at.is_integer()).then_some(at)
 }
 
+/// Whether a dotted path of a TOML value names a number or a list.
+fn is_figure(root: &toml::Value, path: &str) -> bool {
+    let (list, index) = match path.strip_suffix(']').and_then(|p| p.split_once('[')) {
+        Some((list, index)) => (list, index.parse::<usize>().ok()),
+        None => (path, None),
+    };
+    let at = list.split('.').try_fold(root, |at, key| at.as_table()?.get(key));
+    match (at, list == path, index) {
+        (Some(at), true, _) => at.is_float() || at.is_integer() || at.is_array(),
+        (Some(at), false, Some(i)) => at.as_array().is_some_and(|a| i < a.len()),
+        _ => false,
+    }
+}
+
 /// The dotted paths of all numbers of a TOML value.
 fn number_paths(at: &toml::Value, path: String, out: &mut Vec<String>) {
     match at {
         toml::Value::Float(_) | toml::Value::Integer(_) => out.push(path),
         toml::Value::Table(table) => {
             let dot = if path.is_empty() { "" } else { "." };
-            for (key, value) in table {
+            for (key, value) in table.iter().filter(|(key, _)| *key != "provenance") {
                 number_paths(value, format!("{path}{dot}{key}"), out);
             }
         }
@@ -286,7 +310,8 @@ fn number_paths(at: &toml::Value, path: String, out: &mut Vec<String>) {
     }
 }
 
-fn parse(name: &str, text: &str, e: &toml::de::Error) -> DynamicsError {
+/// What a TOML reader says, with the line.
+pub(crate) fn parse(name: &str, text: &str, e: &toml::de::Error) -> DynamicsError {
     let place = e.span().map_or(String::new(), |span| {
         let end = span.start.min(text.len());
         format!("line {}: ", text[..end].matches('\n').count() + 1)

@@ -45,7 +45,7 @@ pub(crate) enum Command {
     Recover(cmd::recover::Args),
     /// Puts the virtual truck alone on a bus, in wall time.
     Ecu(cmd::ecu::Args),
-    /// Makes sheets of truck files, for programs on a truck.
+    /// Makes truck files of data sheets, and sheets of truck files for programs on a truck.
     #[command(subcommand)]
     Truck(cmd::truck::Command),
     /// Lists and shows the built-in scenarios.
