@@ -72,12 +72,9 @@ impl dyn Evidence + '_ {
 
     /// Gradient of every drive at the fit, less its part of the prior's.
     fn pulls(&self, fit: &Fit) -> Vec<DVector<f64>> {
-        let zero = self.zero();
-        let sigma = prior(&fit.free);
         let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
         let pull = DVector::from_fn(k, |j, _| {
-            let p = fit.free[j] as usize;
-            (fit.theta[p] - zero[p]) / (sigma[j] * sigma[j] * drives)
+            fit.priors[j].pull(fit.theta[fit.free[j] as usize]) / drives
         });
         let scores = fit.gram.scores(&DVector::zeros(k));
         scores.into_iter().map(|score| score - &pull).collect()

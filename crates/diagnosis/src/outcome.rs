@@ -208,6 +208,7 @@ fn not_carried(causes: &[Cause], why: impl Fn(&Cause) -> Option<String>) -> Vec<
 }
 
 /// A truck's name as a file name.
-fn file_name(name: &str) -> String {
+#[must_use]
+pub fn file_name(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }

@@ -14,6 +14,7 @@ use std::collections::BTreeMap;
 use dynamics::{Overlay, OverlayValue, TruckParameters};
 use tractrix_core::RPM_PER_RAD_S;
 
+use crate::param::P;
 use crate::replay::{CRUISE_RPM, LOW_LOAD_FRAC, RETARDER_LAG_S, RETARDER_POWER_W};
 use crate::{Cause, NotObservable};
 
@@ -180,6 +181,19 @@ impl Carry {
             Self::Implied | Self::Nowhere(_) => Vec::new(),
         }
     }
+}
+
+/// The figure of a truck file that carries a parameter of a cause, with a size.
+pub(crate) fn figure(
+    truck: &TruckParameters,
+    id: &str,
+    p: P,
+    size: f64,
+) -> Option<(&'static str, f64)> {
+    let key = p.spec().key;
+    let value = if key.ends_with("scale") { 1.0 + size } else { size };
+    let figures = carry(id, key)?.figures(truck, value, 0.0);
+    figures.first().map(|f| (f.path, f.value))
 }
 
 fn full_load_nm(truck: &TruckParameters, rpm: f64) -> f64 {

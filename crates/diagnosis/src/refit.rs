@@ -31,6 +31,8 @@ pub(crate) struct Fit {
     pub(crate) log_z: f64,
     /// Free parameters in the order of the set.
     pub(crate) free: Vec<P>,
+    /// What was known of them before.
+    pub(crate) priors: Vec<Prior>,
     pub(crate) covariance: DMatrix<f64>,
     pub(crate) gram: Gram,
     /// Residual norm at the fit.
@@ -53,6 +55,20 @@ pub(crate) fn prior(free: &[P]) -> Vec<f64> {
     free.iter().map(|p| p.spec().prior).collect()
 }
 
+/// What is known of a parameter before the drives: a normal distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Prior {
+    pub(crate) mean: f64,
+    pub(crate) sigma: f64,
+}
+
+impl Prior {
+    /// How a parameter pulls on the cost, in deviations over its spread.
+    pub(crate) fn pull(self, value: f64) -> f64 {
+        (value - self.mean) / (self.sigma * self.sigma)
+    }
+}
+
 /// A step that was tried.
 #[derive(Clone, Copy)]
 struct Step {
@@ -73,7 +89,7 @@ struct Normal {
 /// The parameters that a set frees, with their priors about the reference.
 struct Free {
     params: Vec<P>,
-    sigma: Vec<f64>,
+    priors: Vec<Prior>,
     /// Those of them that are shapes: they move by a few secant steps at once.
     shapes: Vec<P>,
     /// Places of those of the member that came last, if others were there before.
@@ -93,24 +109,30 @@ impl Free {
             _ => Vec::new(),
         };
         let shapes = set.iter().flat_map(|h| CATALOGUE[*h].shapes).copied().collect();
-        Self { sigma: prior(&params), params, shapes, newest, zero }
+        let priors = params
+            .iter()
+            .map(|p| Prior { mean: zero[*p as usize], sigma: p.spec().prior })
+            .collect();
+        Self { priors, params, shapes, newest, zero }
     }
 
-    fn deviation(&self, p: P, theta: &Theta) -> f64 {
-        theta[p as usize] - self.zero[p as usize]
+    /// Figures rather than causes, each with a prior of its own.
+    fn figures(figures: &[(P, Prior)], zero: Theta) -> Self {
+        let (params, priors) = figures.iter().copied().unzip();
+        Self { params, priors, shapes: Vec::new(), newest: Vec::new(), zero }
     }
 
     /// Squared residual and prior.
     fn cost(&self, norm: f64, theta: &Theta) -> f64 {
-        let priors = self.params.iter().zip(&self.sigma);
-        norm + priors.map(|(p, s)| (self.deviation(*p, theta) / s).powi(2)).sum::<f64>()
+        let priors = self.params.iter().zip(&self.priors);
+        norm + priors.map(|(p, q)| ((theta[*p as usize] - q.mean) / q.sigma).powi(2)).sum::<f64>()
     }
 
     fn normal(&self, gram: &Gram, theta: &Theta) -> Normal {
         let (mut a, mut b, _) = gram.sum(|_| true);
-        for (j, (p, s)) in self.params.iter().zip(&self.sigma).enumerate() {
-            a[(j, j)] += 1.0 / (s * s);
-            b[j] -= self.deviation(*p, theta) / (s * s);
+        for (j, (p, q)) in self.params.iter().zip(&self.priors).enumerate() {
+            a[(j, j)] += 1.0 / (q.sigma * q.sigma);
+            b[j] -= q.pull(theta[*p as usize]);
         }
         Normal { a, b }
     }
@@ -152,7 +174,17 @@ struct Standing {
 impl dyn Evidence + '_ {
     /// Fits the parameters of a set by Gauss-Newton with step halving, from `start`.
     pub(crate) fn fit(&self, set: &[usize], start: &Theta, zero_norm: f64) -> Option<Fit> {
-        let free = Free::of(set, *self.zero());
+        self.fit_free(set, Free::of(set, *self.zero()), start, zero_norm)
+    }
+
+    /// Fits figures with priors of their own from where nothing is off.
+    pub(crate) fn fit_figures(&self, figures: &[(P, Prior)]) -> Option<Fit> {
+        let zero = *self.zero();
+        let norm = self.gram(&zero, &[]).0.sum(|_| true).2;
+        self.fit_free(&[], Free::figures(figures, zero), &zero, norm)
+    }
+
+    fn fit_free(&self, set: &[usize], free: Free, start: &Theta, zero_norm: f64) -> Option<Fit> {
         let along = directions(&free.params, start);
         let (gram, chi) = self.gram(start, &along);
         let began = free.cost(gram.sum(|_| true).2, start);
@@ -211,7 +243,8 @@ impl dyn Evidence + '_ {
     /// Evidence and covariance where a fit has ended (Laplace).
     fn fitted(&self, set: &[usize], free: Free, at: Standing, zero_norm: f64) -> Option<Fit> {
         let (a, _, norm) = at.gram.sum(|_| true);
-        let (k, sigma) = (free.params.len(), &free.sigma);
+        let k = free.params.len();
+        let sigma: Vec<f64> = free.priors.iter().map(|p| p.sigma).collect();
         let scaled = DMatrix::from_fn(k, k, |i, j| {
             sigma[i] * a[(i, j)] * sigma[j] + if i == j { 1.0 } else { 0.0 }
         });
@@ -225,6 +258,7 @@ impl dyn Evidence + '_ {
             theta: at.theta,
             log_z: 0.5 * (zero_norm - at.cost) - 0.5 * log_det,
             free: free.params,
+            priors: free.priors,
             covariance,
             gram: at.gram,
             norm,

@@ -27,6 +27,8 @@ pub(crate) enum Command {
     Drives(Box<cmd::drives::Command>),
     /// Finds what the simulation gets wrong on measured drives, and why.
     Diagnose(Box<cmd::diagnose::Args>),
+    /// Makes a truck file of measured drives of a truck that is in order.
+    Identify(Box<cmd::identify::Args>),
     /// Plans measurements: which manoeuvres tell causes apart.
     #[command(subcommand)]
     Experiment(cmd::experiment::Command),

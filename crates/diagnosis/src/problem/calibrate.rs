@@ -38,7 +38,7 @@ impl Reference {
         Self {
             theta,
             tolerance,
-            mean_spread: if clean { 0.0 } else { MEAN_PRIOR },
+            mean_spread: [if clean { 0.0 } else { MEAN_PRIOR }; PARAMS],
             whiteners,
             ratio: [1.0; MODULES],
             settled: [1.0; MODULES],

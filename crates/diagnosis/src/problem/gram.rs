@@ -164,7 +164,15 @@ impl Problem<'_> {
             g -= y.transpose() * y;
         }
         factor.solve_mut(&mut zc);
-        (g, zc * self.reference.mean_spread)
+        (g, self.of_means(zc))
+    }
+
+    /// Products with the tolerances as products with the common effects.
+    fn of_means(&self, mut against: DMatrix<f64>) -> DMatrix<f64> {
+        for (mut row, spread) in against.row_iter_mut().zip(self.mean_spreads()) {
+            row *= spread;
+        }
+        against
     }
 
     /// Marginal Gram matrix over the residual and hat functions of one module: `places` gives the
@@ -230,6 +238,6 @@ impl Problem<'_> {
             out -= y.transpose() * y;
         }
         nuisance.factor.solve_mut(&mut against);
-        (out, against * self.reference.mean_spread)
+        (out, self.of_means(against))
     }
 }

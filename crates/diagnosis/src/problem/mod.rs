@@ -35,7 +35,7 @@ pub(crate) struct Reference {
     /// Scatter between drives, per parameter; 0 where none.
     pub(crate) tolerance: [f64; PARAMS],
     /// Standard deviation of the tolerances' means, in the scatter between drives.
-    pub(crate) mean_spread: f64,
+    pub(crate) mean_spread: [f64; PARAMS],
     pub(crate) whiteners: Vec<Whitener>,
     /// Mean square of whitened residuals at the calibration, tolerances included, per module.
     pub(crate) ratio: [f64; MODULES],
@@ -44,6 +44,9 @@ pub(crate) struct Reference {
     /// Evidence of the best free function per module on drives that are in order, nats per drive.
     pub(crate) free_form: [f64; MODULES],
 }
+
+/// Times that the noise is learned: each needs the tolerances of the one before.
+const NOISE_ROUNDS: usize = 2;
 
 /// A set of drives ready for the search.
 pub(crate) struct Problem<'a> {
@@ -87,7 +90,7 @@ impl<'a> Problem<'a> {
         let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
         let reference = Reference::start(&drives, &residuals, theta, clean);
         let mut problem = Self::with(plant, drives, reference, executor)?;
-        for round in 0..2 {
+        for round in 0..NOISE_ROUNDS {
             if clean {
                 problem.calibrate(round == 0)?;
             } else {
@@ -97,14 +100,12 @@ impl<'a> Problem<'a> {
                 problem.scatter();
                 problem.rebuild(Changed::Scatter)?;
             }
-            let noise = problem.each(|i| problem.without_nuisance(i, &problem.nuisance_mean(i)));
-            problem.reference.whiteners = fit_whiteners(&problem.drives, &noise, false);
-            problem.rebuild(Changed::Noise)?;
+            problem.learn_noise()?;
         }
         if clean {
             problem.scatter();
             // What the baseline calls the mean is known up to its own scatter.
-            problem.reference.mean_spread = (1.0 / problem.drives.len() as f64).sqrt();
+            problem.reference.mean_spread = [(1.0 / problem.drives.len() as f64).sqrt(); PARAMS];
             problem.rebuild(Changed::Scatter)?;
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
             problem.reference.settled = problem.settled(&problem.reference.theta);
@@ -115,6 +116,36 @@ impl<'a> Problem<'a> {
             }
         }
         Ok(problem)
+    }
+
+    /// Learns the noise from drives whose truck is to be identified: the means of `figures` are what
+    /// is asked for, no tolerance.
+    pub(crate) fn learn_about(
+        plant: &'a Plant,
+        drives: Vec<Prepared>,
+        figures: &[P],
+        executor: &'a dyn Executor,
+    ) -> Result<Self, DiagnosisError> {
+        let theta = [0.0; PARAMS];
+        let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
+        let mut reference = Reference::start(&drives, &residuals, theta, false);
+        for p in figures {
+            reference.tolerance[*p as usize] = p.spec().scatter();
+            reference.mean_spread[*p as usize] = 0.0;
+        }
+        let mut problem = Self::with(plant, drives, reference, executor)?;
+        for _ in 0..NOISE_ROUNDS {
+            problem.recentre()?;
+            problem.learn_noise()?;
+        }
+        Ok(problem)
+    }
+
+    /// Takes the noise from what the tolerances leave over.
+    fn learn_noise(&mut self) -> Result<(), DiagnosisError> {
+        let noise = self.each(|i| self.without_nuisance(i, &self.nuisance_mean(i)));
+        self.reference.whiteners = fit_whiteners(&self.drives, &noise, false);
+        self.rebuild(Changed::Noise)
     }
 
     /// Mean square of whitened residuals per module; 1 where a module has no rows.

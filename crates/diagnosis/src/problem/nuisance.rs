@@ -100,13 +100,20 @@ impl Problem<'_> {
             .into_iter()
             .collect::<Option<Vec<_>>>()
             .ok_or_else(|| DiagnosisError::Numerics("tolerances of a drive".into()))?;
-        let spread = self.reference.mean_spread.powi(2);
+        let spread = self.mean_spreads();
         let information = |n: &Nuisance| {
             let q = n.sigma.len();
-            (DMatrix::identity(q, q) - n.factor.inverse()) * spread
+            let own = DMatrix::identity(q, q) - n.factor.inverse();
+            DMatrix::from_fn(q, q, |a, b| own[(a, b)] * (spread[a] * spread[b]))
         };
         self.common = Arc::new(self.nuisance.iter().map(information).collect());
         Ok(())
+    }
+
+    /// Standard deviations of the tolerances' means, in the order of their columns.
+    pub(super) fn mean_spreads(&self) -> Vec<f64> {
+        let directions = nuisance_directions(&self.reference.tolerance);
+        directions.iter().map(|d| self.reference.mean_spread[d.p as usize]).collect()
     }
 
     /// Symmetric matrix of the inner products of lines.

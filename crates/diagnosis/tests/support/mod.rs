@@ -9,6 +9,7 @@ pub(crate) mod driver;
 pub(crate) mod effects;
 pub(crate) mod engine;
 pub(crate) mod logger;
+pub(crate) mod nominal;
 pub(crate) mod outside;
 pub(crate) mod random;
 pub(crate) mod road;

@@ -6,6 +6,7 @@ pub(crate) mod diagnose;
 pub(crate) mod drives;
 pub(crate) mod ecu;
 pub(crate) mod experiment;
+pub(crate) mod identify;
 pub(crate) mod map;
 pub(crate) mod plan;
 pub(crate) mod process_replay;
@@ -30,6 +31,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Decode(args)) => decode::run(&args),
         Some(Command::Drives(command)) => drives::run(&command),
         Some(Command::Diagnose(args)) => diagnose::run(&args),
+        Some(Command::Identify(args)) => identify::run(&args),
         Some(Command::Experiment(command)) => experiment::run(&command),
         Some(Command::Traffic(args)) => traffic::run(&args),
         Some(Command::Map(command)) => map::run(command),
