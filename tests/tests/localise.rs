@@ -288,7 +288,7 @@ fn in_a_steady_turn_the_trailer_turns_as_the_tractor_does() {
 
 #[test]
 fn a_road_that_does_not_contain_the_pose_is_named_and_a_map_without_a_place_refused() {
-    let plain = Arc::new(builtin::highway());
+    let plain = Arc::new(builtin::highway().with_geo_reference(&geo("")));
     let refused = Localiser::new(LocaliserConfig::default(), &limits(), plain).unwrap_err();
     assert!(refused.to_string().contains("projection"), "{refused}");
     let mut localiser = Localiser::new(LocaliserConfig::default(), &limits(), highway()).unwrap();

@@ -1,15 +1,22 @@
 //! Built-in roads: a real hilly highway, a real sag, a synthetic test site, a flat straight.
+//!
+//! All begin at 50° N, 10° E and go east. The place is invented, so that there are satellite fixes:
+//! none of the roads is there, not even those with the grades of real ones.
 
 use alloc::{vec, vec::Vec};
 
 use tractrix_core::GRAVITY_M_S2;
 
 use crate::road::parallel_lanes;
-use crate::{Cubics, LaneEnd, LaneKind, LaneTrack, Line, Road, RoadObject};
+use crate::{Cubics, GeoReference, LaneEnd, LaneKind, LaneTrack, Line, Road, RoadObject};
 
 /// Grades of two stretches of real long-haul drives; origin and licence in the heads of the files.
 const HILLS: &str = include_str!("../data/highway_hills.csv");
 const SAG: &str = include_str!("../data/longhaul_hills.csv");
+
+/// Transverse Mercator with the origin of the map as its own: x is east, y north.
+const PROJECTION: &str =
+    "+proj=tmerc +lat_0=50 +lon_0=10 +k=1 +x_0=0 +y_0=0 +ellps=WGS84 +units=m +no_defs";
 
 const LANE_WIDTH_M: f64 = 3.75;
 const LENGTH_M: f64 = 15_000.0;
@@ -181,7 +188,8 @@ fn slopes(grades_csv: &str) -> Vec<(f64, f64)> {
 
 #[expect(clippy::expect_used, reason = "built-in tables; the tests of this file build each")]
 fn expect_valid(road: Result<Road, crate::RoadError>) -> Road {
-    road.expect("built-in road")
+    let geo = GeoReference { projection: PROJECTION.into(), ..GeoReference::default() };
+    road.expect("built-in road").with_geo_reference(&geo)
 }
 
 #[cfg(test)]

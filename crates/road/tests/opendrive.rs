@@ -263,6 +263,7 @@ fn a_built_in_road_written_as_opendrive_and_read_again_is_the_same() {
     for road in [builtin::highway(), builtin::test_site(), builtin::flat(3_000.0)] {
         let again = read(&road.write_opendrive()).longest_route().unwrap();
         same_road(&road, &again);
+        assert!(road.geo_reference().is_some() && road.geo_reference() == again.geo_reference());
     }
 }
 

@@ -62,6 +62,10 @@ fn a_log_without_a_drive_gets_one_line_that_says_why_and_leaves_nothing() {
     std::fs::write(&empty, "").unwrap();
     let binary = folder.path().join("binary.log");
     std::fs::write(&binary, [0u8, 255, 3, 200, 10, 7]).unwrap();
+    let nowhere = folder.path().join("nowhere.xodr");
+    let road = road::builtin::flat(1_000.0).with_geo_reference(&road::GeoReference::default());
+    std::fs::write(&nowhere, road.write_opendrive()).unwrap();
+    let nowhere = nowhere.display().to_string();
     let (empty, binary) = (empty.display().to_string(), binary.display().to_string());
     let (idle, parked, drives) =
         (log("css_truck_idle"), log("uthp_modern_parked"), log("t270_normal"));
@@ -73,7 +77,7 @@ fn a_log_without_a_drive_gets_one_line_that_says_why_and_leaves_nothing() {
         (&[&binary], "binary.log"),
         (&["nowhere.log"], "nowhere.log"),
         (&[&drives, &drives], "two logs are named t270_normal"),
-        (&[&drives, "--map", "builtin:flat"], "does not say where on earth it lies"),
+        (&[&drives, "--map", &nowhere], "does not say where on earth it lies"),
     ];
     for (arguments, named) in cases {
         let command = ["drives", "from-can", "--truck", "reference", "--out", &at];
@@ -83,4 +87,53 @@ fn a_log_without_a_drive_gets_one_line_that_says_why_and_leaves_nothing() {
     }
     let line = refused(&["drives", "from-can", &drives, "--truck", "nosuch", "--out", &at]);
     assert!(line.contains("nosuch"), "{line}");
+}
+
+/// The frames that went over the bus of a run, as candump writes them.
+fn logged(recording: &Path, to: &Path) {
+    let mut inputs = recording::Inputs::open(recording, true).unwrap();
+    let mut lines = Vec::new();
+    while let Some(call) = inputs.next_call().unwrap() {
+        let sent = call.sent.iter().map(|sent| (call.now, sent.frame));
+        let received = call.received.iter().flatten().map(|heard| (heard.time, heard.value));
+        for (time, frame) in sent.chain(received) {
+            let bytes = &frame.data[..usize::from(frame.len)];
+            let hex: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
+            let at_s = 10.0 + time.seconds();
+            lines.push((time, format!("({at_s:.6}) can0 {:08X}#{hex}\n", frame.id)));
+        }
+    }
+    lines.sort_by_key(|(time, _)| *time);
+    std::fs::write(to, lines.into_iter().map(|(_, line)| line).collect::<String>()).unwrap();
+}
+
+/// The built-in roads lie on the earth: by the fixes of the bus a log finds its place, and its grade.
+#[test]
+fn a_log_of_a_run_on_a_built_in_road_finds_its_grade_by_position() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let run = ["run", "highway-sag", "--truck", "reference", "--vehicle", "bus", "--headless"];
+    let rest = ["--traffic", "none", "--duration", "90", "--out", &at("run")];
+    let output = server(&[&run[..], &rest].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    logged(&folder.path().join("run/run.mcap"), &folder.path().join("bus.log"));
+    let drives = ["drives", "from-can", &at("bus.log"), "--truck", "reference"];
+    let rest = ["--mass-kg", "40000", "--map", "builtin:highway-sag", "--out", &at("drives")];
+    let output = server(&[&drives[..], &rest].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = std::fs::read_to_string(at("drives/bus_1.csv")).unwrap();
+    let mut lines = table.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let (s_m, speed_m_s) = (column("s_map_m"), column("speed_m_s"));
+    let road = road::Road::load("builtin:highway-sag").unwrap();
+    let map = std::fs::read_to_string(at("drives/map.csv")).unwrap();
+    let grade = map.lines().nth(401).unwrap().split(',').nth(1).unwrap().parse::<f64>().unwrap();
+    assert!((grade - road.at(2_000.0, 0.0).grade_rad.tan()).abs() < 1e-9, "{grade}");
+    let rows: Vec<Vec<f64>> =
+        lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+    let (first, last) = (&rows[0], &rows[rows.len() - 1]);
+    let driven_m = last[s_m] - first[s_m];
+    assert!(driven_m > 1_000.0 && last[speed_m_s] > 10.0, "{driven_m}");
+    assert!(rows.windows(2).all(|w| w[1][s_m] > w[0][s_m]), "the place goes on");
 }

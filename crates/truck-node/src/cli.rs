@@ -21,7 +21,7 @@ pub(crate) struct Args {
     /// Bit rate of that bus, kbit/s; what its load is measured against.
     #[arg(long, value_name = "KBIT_S", value_enum, default_value = "250")]
     pub(crate) bit_rate: Rate,
-    /// The road: .xodr with a geo reference.
+    /// The road: .xodr with a geo reference, or a built-in one (builtin:flat, for trials).
     #[arg(long, value_name = "ROAD")]
     pub(crate) map: String,
     /// The truck's sheet, made by `sim-server truck sheet`, with its tables `bus` and `pose`.

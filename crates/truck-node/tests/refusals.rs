@@ -10,12 +10,17 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use j1939::bus::Bus;
 use j1939::{AddressClaim, Frame, Id, Name};
+use road::{GeoReference, Road};
 use support::{Files, Wire, node, refusal, sim_server};
 
 /// Nobody listens there: what is wrong has to be noticed before.
 const NO_BUS: &str = "socketcand:127.0.0.1:1/can0";
 
 fn run(files: &Files, words: &[&str]) -> Output {
+    run_as(node(), files, words)
+}
+
+fn run_as(mut node: Command, files: &Files, words: &[&str]) -> Output {
     let (map, sheet) = (files.path("road.xodr"), files.path("sheet.toml"));
     let mut all = vec!["--can", NO_BUS, "--map", &map, "--truck", &sheet];
     for pair in words.chunks(2) {
@@ -24,7 +29,7 @@ fn run(files: &Files, words: &[&str]) -> Output {
             None => all.extend(pair),
         }
     }
-    node().args(all).output().unwrap()
+    node.args(all).output().unwrap()
 }
 
 #[test]
@@ -98,11 +103,14 @@ fn tables_of_the_bus_and_the_pose_are_checked() {
 #[test]
 fn options_that_cannot_be_used_are_named() {
     let files = Files::new(3.0);
-    let out = files.path("out");
+    let (out, nowhere) = (files.path("out"), files.path("nowhere.xodr"));
+    let road = Road::load(&files.path("road.xodr")).unwrap();
+    let road = road.with_geo_reference(&GeoReference::default());
+    std::fs::write(&nowhere, road.write_opendrive()).unwrap();
     std::fs::create_dir(&out).unwrap();
     std::fs::write(files.path("out/run.mcap"), "mine").unwrap();
     for (words, says) in [
-        (["--map", "builtin:flat"], "projection of the map: the map has none"),
+        (["--map", &nowhere], "projection of the map: the map has none"),
         (["--map", "no.xodr"], "no.xodr"),
         (["--set-speed-m-s", "NaN"], "set_speed_m_s"),
         (["--pose", "nmea:/no/such/device"], "/no/such/device"),
@@ -118,6 +126,17 @@ fn options_that_cannot_be_used_are_named() {
         let error = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.code() == Some(2) && error.contains(words[0]), "{error}");
     }
+}
+
+/// A service manager or a container may keep CAN sockets from a program.
+#[test]
+fn an_interface_without_permission_is_named() {
+    let files = Files::new(3.0);
+    let mut denied = Command::new("python3");
+    let support = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/no_can.py");
+    denied.arg(support).arg(node().get_program()).args(node().get_args());
+    let line = refusal(&run_as(denied, &files, &["--can", "lo"]));
+    assert!(line.contains("--can lo: no permission to open a CAN socket"), "{line}");
 }
 
 /// Somebody has the address: he keeps it, and only one question was asked.
@@ -231,4 +250,8 @@ fn a_bus_of_the_kernel_that_cannot_be_used_is_named() {
     let error = ["vcan0", "20000008#0000020000000000"];
     let line = refusal(&beside(error, || run(&files, &["--can", "vcan0"])));
     assert!(line.contains("error frames and no other: wrong bit rate"), "{line}");
+    // what a controller says that nobody acknowledges until it gives up
+    let off = ["vcan0", "20000040#0000000000000000"];
+    let line = refusal(&beside(off, || run(&files, &["--can", "vcan0"])));
+    assert!(line.contains("vcan0: the controller is off the bus"), "{line}");
 }
