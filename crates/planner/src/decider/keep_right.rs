@@ -7,9 +7,8 @@
 //! than in [`STAY_S`] at its wish speed. Without that, a truck that overtakes a column would weave
 //! into each of its gaps.
 
-use super::{LEAVE_WITHIN_M, LaneChoice, View};
+use super::{LaneChoice, View};
 use crate::safety::in_lane;
-use road::LaneEnd;
 
 /// A return must last, s: the 20 s after which German courts see a right lane as usable.
 pub(crate) const STAY_S: f64 = 20.0;
@@ -23,12 +22,8 @@ pub(crate) fn keep_right(
     leaving_gap_m: impl Fn(f64) -> f64,
     rear_gap_m: f64,
 ) -> LaneChoice {
-    let Some(lane) = view.beside(LaneChoice::Right) else { return LaneChoice::Keep };
-    let wish_m_s = view.reference_speed_m_s.max(view.ego.speed_m_s);
-    let stay_m = STAY_S * wish_m_s;
-    let ends_soon = view.road.lanes().get(usize::from(lane)).is_none_or(|track| {
-        track.end != LaneEnd::Continues && track.s_end_m - view.ego.s_m < LEAVE_WITHIN_M + stay_m
-    });
+    let Some(lane) = view.lasting_beside(LaneChoice::Right) else { return LaneChoice::Keep };
+    let wish_m_s = view.wish_speed_m_s.max(view.ego.speed_m_s);
     // Every vehicle there counts: a slow one may be hidden by a fast one that will be gone.
     let (front_m, width_m) = (view.extent.front_s_m, view.extent.width_m);
     let ahead = view.scene.neighbours.iter().filter(|n| n.front_s_m > front_m);
@@ -37,5 +32,5 @@ pub(crate) fn keep_right(
         n.rear_s_m - front_m >= leaving_gap_m(n.speed_m_s) + closing_m
     });
     let behind_serves = view.behind(lane).is_none_or(|(_, gap_m)| gap_m >= rear_gap_m);
-    if !ends_soon && ahead_serves && behind_serves { LaneChoice::Right } else { LaneChoice::Keep }
+    if ahead_serves && behind_serves { LaneChoice::Right } else { LaneChoice::Keep }
 }

@@ -85,8 +85,8 @@ fn follower_m_s2(n: &Neighbour, ahead: Option<(f64, f64)>) -> f64 {
 /// left lane, m; others' accelerations left out.
 #[must_use]
 pub(crate) fn leaving_gap_m(view: &View<'_>, config: &MobilConfig, lead_m_s: f64) -> f64 {
-    let ego = driver(VehicleClass::Truck, view.reference_speed_m_s);
-    let v = view.reference_speed_m_s.max(view.ego.speed_m_s);
+    let ego = driver(VehicleClass::Truck, view.wish_speed_m_s);
+    let v = view.wish_speed_m_s.max(view.ego.speed_m_s);
     let worth = (config.threshold_m_s2 + config.bias_right_m_s2).max(0.01);
     ego.wanted_gap_m(v, v - lead_m_s) * libm::sqrt(ego.accel_m_s2 / worth)
 }
@@ -95,7 +95,7 @@ pub(crate) fn leaving_gap_m(view: &View<'_>, config: &MobilConfig, lead_m_s: f64
 #[must_use]
 pub(crate) fn mobil(view: &View<'_>, config: &MobilConfig) -> LaneChoice {
     let v = view.ego.speed_m_s;
-    let ego = driver(VehicleClass::Truck, view.reference_speed_m_s);
+    let ego = driver(VehicleClass::Truck, view.wish_speed_m_s);
     let length_m = view.extent.front_s_m - view.extent.rear_s_m;
     let lead = |lane: u16| view.ahead(lane).map(|(n, gap_m)| (gap_m, n.speed_m_s));
     // Whoever follows gets what is ahead of the ego where the ego is not; its length opens.
@@ -108,7 +108,7 @@ pub(crate) fn mobil(view: &View<'_>, config: &MobilConfig) -> LaneChoice {
     });
     let criterion = config.criterion();
     let incentive = |choice: LaneChoice| -> Option<f64> {
-        let lane = view.beside(choice)?;
+        let lane = view.lasting_beside(choice)?;
         if lead(lane).is_some_and(|(gap_m, _)| gap_m <= 0.0) {
             return None;
         }

@@ -16,6 +16,7 @@ mod rules;
 #[cfg(test)]
 mod tests;
 
+use keep_right::STAY_S;
 pub(crate) use keep_right::keep_right;
 pub use mobil::MobilConfig;
 pub(crate) use mobil::{leaving_gap_m, mobil};
@@ -80,8 +81,8 @@ pub(crate) struct View<'a> {
     pub road: &'a Road,
     /// The lane that the truck keeps.
     pub lane: u16,
-    /// Reference speed at the truck, m/s.
-    pub reference_speed_m_s: f64,
+    /// The speed that the truck would drive here without others, m/s.
+    pub wish_speed_m_s: f64,
 }
 
 impl<'a> View<'a> {
@@ -93,10 +94,10 @@ impl<'a> View<'a> {
         scene: &'a Scene,
         road: &'a Road,
         lane: u16,
-        reference_speed_m_s: f64,
+        wish_speed_m_s: f64,
     ) -> Self {
         let extent = EgoExtent::new(ego, geometry);
-        Self { ego, extent, scene, road, lane, reference_speed_m_s }
+        Self { ego, extent, scene, road, lane, wish_speed_m_s }
     }
 
     /// The through lane on a side, if there is one here.
@@ -109,6 +110,18 @@ impl<'a> View<'a> {
         }?;
         let through = self.road.lanes().get(usize::from(id))?.kind == LaneKind::Driving;
         through.then_some(id)
+    }
+
+    /// The through lane on a side that serves for a while. Whoever changes into one that ends must
+    /// soon leave it again, and waits at its end for a gap.
+    #[must_use]
+    pub(crate) fn lasting_beside(&self, choice: LaneChoice) -> Option<u16> {
+        let lane = self.beside(choice)?;
+        let track = self.road.lanes().get(usize::from(lane))?;
+        let wish_m_s = self.wish_speed_m_s.max(self.ego.speed_m_s);
+        let lasts = track.end == LaneEnd::Continues
+            || track.s_end_m - self.ego.s_m >= LEAVE_WITHIN_M + STAY_S * wish_m_s;
+        lasts.then_some(lane)
     }
 
     /// The nearest vehicle ahead in a lane and the gap to it, m.

@@ -11,7 +11,7 @@ pub(crate) fn rules(view: &View<'_>, distance_m: f64) -> LaneChoice {
         return LaneChoice::Keep;
     }
     let free = |choice: LaneChoice| {
-        view.beside(choice).is_some_and(|lane| {
+        view.lasting_beside(choice).is_some_and(|lane| {
             view.ahead(lane).is_none_or(|(_, gap_m)| gap_m >= distance_m)
                 && view.behind(lane).is_none_or(|(_, gap_m)| gap_m >= distance_m)
         })

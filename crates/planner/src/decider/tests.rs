@@ -239,3 +239,41 @@ fn a_column_is_overtaken_in_one_go_and_single_vehicles_one_by_one() {
         assert!(right_frac > 0.4, "mobil {by_mobil}: {right_frac}");
     }
 }
+
+#[test]
+fn nobody_overtakes_in_a_lane_that_ends_soon() {
+    // Under MOBIL the main job's truck changed into the third lane to overtake, and waited at its
+    // end: a fifth of the time that traffic cost it.
+    let road = builtin::highway();
+    let g = reference_geometry();
+    let (config, v) = (MobilConfig::default(), 22.0);
+    let mut ends = 0;
+    for ending in road.lanes().iter().filter(|l| l.kind == road::LaneKind::Driving) {
+        for before_m in [300.0, 1_000.0] {
+            let s_m = ending.s_end_m - before_m;
+            let Some(lane) = road.right_of(ending.id, s_m).filter(|_| ending.exists_at(s_m)) else {
+                continue;
+            };
+            let d_m = road.lanes()[usize::from(lane)].center_d_m(s_m);
+            let ego = EgoState { s_m, d_m, speed_m_s: v, ..EgoState::default() };
+            let slow = Neighbour {
+                class: VehicleClass::Truck,
+                front_s_m: s_m + g.front_m + 56.0,
+                rear_s_m: s_m + g.front_m + 40.0,
+                d_m,
+                width_m: 2.5,
+                speed_m_s: 15.0,
+                lane,
+                ..Neighbour::default()
+            };
+            let scene = Scene { neighbours: [slow].into(), ..Scene::default() };
+            let view = View::new(&ego, &g, &scene, &road, lane, v);
+            let goes_on = ending.end == road::LaneEnd::Continues;
+            for wish in [rules(&view, 50.0), mobil(&view, &config)] {
+                assert_eq!(wish == LaneChoice::Left, goes_on, "lane {} at {s_m} m", ending.id);
+            }
+            ends += u32::from(!goes_on);
+        }
+    }
+    assert!(ends > 0, "the road has a lane that ends");
+}

@@ -121,6 +121,13 @@ impl Stack {
         self.config.speed_planner == SpeedPlannerKind::Cruise && self.config.overspeed_m_s > 0.0
     }
 
+    /// The speed that the truck would drive without others, m/s. A plan begins at the speed that it
+    /// has, and may be made for staying behind somebody: the reference then wishes nothing.
+    fn wish_speed_m_s(&self, at: &Situation<'_>) -> f64 {
+        let allowed = self.plans_ahead().then(|| self.ceiling.at(at.ego.s_m)).flatten();
+        allowed.map_or(at.reference_speed_m_s, |(m_s, _)| m_s.max(at.reference_speed_m_s))
+    }
+
     /// Plans the speed of the next kilometres, if it is time to.
     fn plan_speed(
         &mut self,
@@ -160,12 +167,10 @@ impl Stack {
             obey_speed_limits: self.config.obey_speed_limits,
             curve_accel_m_s2: self.config.curve_accel_m_s2,
         };
-        if self.may_overspeed() {
-            let over = SpeedBounds {
-                set_speed_m_s: bounds.set_speed_m_s + self.config.overspeed_m_s,
-                ..bounds
-            };
-            self.ceiling.update(road, lane, ego.s_m, &limits.geometry, &over, |_| None);
+        if self.may_overspeed() || self.plans_ahead() {
+            let over_m_s = if self.may_overspeed() { self.config.overspeed_m_s } else { 0.0 };
+            let allowed = SpeedBounds { set_speed_m_s: bounds.set_speed_m_s + over_m_s, ..bounds };
+            self.ceiling.update(road, lane, ego.s_m, &limits.geometry, &allowed, |_| None);
         }
         let profile = match self.config.speed_planner {
             SpeedPlannerKind::Predictive => self.profile.as_ref(),
@@ -204,7 +209,7 @@ impl Stack {
                     at.scene,
                     at.road,
                     maneuver.lane(),
-                    at.reference_speed_m_s,
+                    self.wish_speed_m_s(at),
                 );
                 let law = self.config.keep_right;
                 match kind {

@@ -36,7 +36,8 @@ pub struct Stack {
     longitudinal: LongitudinalController,
     jam: StopAndGo,
     reference: ReferenceSpeed,
-    /// Up to this speed cruise control rolls before it brakes.
+    /// What the driver, limits and curves allow: up to there cruise control rolls before it brakes,
+    /// and so fast a planned truck would be without others.
     ceiling: ReferenceSpeed,
     guard: GuardMemory,
     maneuver: Option<ManeuverPlanner>,
