@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::detectable::detectable;
+use crate::drive_use::{DriveRole, DriveUse, drive_uses};
 use crate::gain::{DriveError, HORIZON_S, drive_error, rms};
 use crate::held_out::gains;
 use crate::hypothesis::CATALOGUE;
@@ -67,6 +68,7 @@ const EXPLAINED: f64 = 0.95;
 pub struct Baseline {
     reference: Reference,
     floor: Vec<DriveError>,
+    used: Vec<DriveUse>,
 }
 
 impl Baseline {
@@ -95,8 +97,10 @@ impl Baseline {
         let clean = drives.drives.iter().map(|d| Prepared::new(d, plant)).collect();
         let problem = Problem::learn(plant, clean, true, executor)?;
         let zero = problem.reference.theta;
-        let floor = problem.drives.iter().map(|d| drive_error(d, plant, &zero)).collect();
-        Ok(Self { reference: problem.reference, floor })
+        let floor: Vec<_> = problem.drives.iter().map(|d| drive_error(d, plant, &zero)).collect();
+        let used = problem.drives.iter().zip(&floor).map(|(d, e)| DriveUse::baseline(d, e));
+        let used = used.collect();
+        Ok(Self { reference: problem.reference, floor, used })
     }
 }
 
@@ -195,6 +199,12 @@ pub fn diagnose_with(
         sigma: Module::ALL.map(|m| problem.reference.whiteners[m as usize].sigma),
     };
     progress(Progress::Gain);
+    let mut used = drive_uses(&problem, DriveRole::Learned, &fit.theta);
+    for (one, alone) in used.iter_mut().zip(problem.evidence().alone(&fit)) {
+        one.alone = alone;
+    }
+    used.extend(held.iter().flat_map(|h| drive_uses(h, DriveRole::HeldOut, &fit.theta)));
+    used.extend(baseline.into_iter().flat_map(|b| b.used.clone()));
     let gain = held.filter(|_| !fit.set.is_empty()).map(|held| gain(plant, &held, &fit));
     let wrong = wrong(&problem, floor);
     let mut findings = drives.findings.clone();
@@ -221,6 +231,7 @@ pub fn diagnose_with(
         gain,
         extended_truck,
         tolerances_from_baseline: baseline.is_some(),
+        drives: used,
         findings,
         models,
     })
@@ -317,14 +328,18 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
             for c in evidence.screen(f, &rest).singles(None) {
                 let rival = &CATALOGUE[c.hypothesis];
                 let (id, mut lost) = (rival.id, lost_nats - c.gain);
-                if lost < LISTED_NATS && rival.nonlinear() {
-                    // What is not linear promises more than it keeps.
+                if lost < LISTED_NATS {
+                    // A screen promises more than it keeps; who stands in for a cause passes the
+                    // gate that the cause has passed.
                     if refitted.contains(&c.hypothesis) {
                         continue;
                     }
                     refitted.push(c.hypothesis);
                     let instead = evidence.with_added(f, &c, empty.norm);
-                    lost = instead.map_or(lost, |r| fit.log_z - r.log_z);
+                    let kept = instead.map(|fit| evidence.gate(fit, empty));
+                    let kept = kept.filter(|fit| fit.set.contains(&c.hypothesis));
+                    let Some(kept) = kept else { continue };
+                    lost = fit.log_z - kept.log_z;
                 }
                 let mut instead = ids(&fewer);
                 instead.push(id);
@@ -341,14 +356,22 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
             if hyp.params().any(|q| q == *p) {
                 let s = p.spec();
                 let x = fit.theta[*p as usize] - zero[*p as usize];
-                let scale = s.key.ends_with("_scale") || s.key == "scale";
                 let form = if hyp.sizes.contains(p) { 0.015 * x.abs() } else { 0.0 };
                 let sigma = (variances[j] + form * form).sqrt();
-                let value = if scale { 1.0 + x } else { x };
+                let value = if s.is_factor() { 1.0 + x } else { x };
                 parameters.insert(s.key, Parameter { value, sigma, unit: s.unit });
             }
         }
-        let sentence = sentence::cause(hyp.id, hyp.size(&fit.theta, zero));
+        let size = hyp.size(&fit.theta, zero);
+        let sigma = {
+            let of = |p: &crate::param::P| {
+                let x = fit.theta[*p as usize] - zero[*p as usize];
+                parameters.get(p.spec().key).map_or(0.0, |q: &Parameter| x * q.sigma)
+            };
+            hyp.sizes.iter().map(of).map(|x| x * x).sum::<f64>().sqrt() / size.abs().max(1e-12)
+        };
+        let unit = hyp.sizes.first().map_or("", |p| p.spec().unit);
+        let sentence = sentence::with_interval(sentence::cause(hyp.id, size), size, sigma, unit);
         let cause = Cause {
             id: hyp.id,
             kind: hyp.kind(),

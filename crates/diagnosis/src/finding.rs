@@ -112,3 +112,43 @@ pub enum Action {
     /// Converted to the column's unit, or shifted to the common clock.
     Corrected,
 }
+
+impl core::fmt::Display for FindingKind {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::UnknownColumn => write!(f, "the contract does not know this column"),
+            Self::NonFinite { samples } => write!(f, "{samples} samples are no numbers"),
+            Self::Implausible { samples, value } => {
+                write!(f, "{samples} samples that no highway truck shows, the first is {value}")
+            }
+            Self::WrongUnit { suspected } => write!(f, "it seems to be in {suspected}"),
+            Self::Stuck { seconds } => write!(f, "it stands still for {seconds:.1} s"),
+            Self::Gap { seconds } => write!(f, "no rows for {seconds:.1} s"),
+            Self::DuplicateTime { rows } => write!(f, "{rows} rows repeat the time before"),
+            Self::ClockOffset { against, seconds, sigma_s, until_s } => {
+                write!(f, "{seconds:.2} ± {sigma_s:.2} s behind {against} until {until_s:.0} s")
+            }
+            Self::ClockDrift { against, first_s, last_s, sigma_s } => write!(
+                f,
+                "its lag behind {against} drifts from {first_s:.2} to {last_s:.2} ± {sigma_s:.2} s"
+            ),
+            Self::ClockJump { against, before_s, after_s, sigma_s } => write!(
+                f,
+                "its lag behind {against} jumps from {before_s:.2} to {after_s:.2} ± {sigma_s:.2} s"
+            ),
+            Self::TruckName { index } => write!(f, "the index names the truck {index:?}"),
+        }
+    }
+}
+
+impl core::fmt::Display for Action {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Kept => "noted only",
+            Self::Interpolated => "interpolated",
+            Self::ChannelDropped => "the channel is not used",
+            Self::RowsDropped => "these rows are not used",
+            Self::Corrected => "corrected",
+        })
+    }
+}

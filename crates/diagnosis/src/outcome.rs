@@ -9,10 +9,10 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::hypothesis::CATALOGUE;
-use crate::report::{GainInterval, Report, report};
+use crate::report::{Report, report};
 use crate::{
     Cause, Diagnosis, DiagnosisError, DriveSet, Executor, Extension, NotObservable, Options, Plant,
-    Progress, TableTrial, diagnose, extend, try_table,
+    Progress, TableTrial, Verdict, diagnose, extend, try_table,
 };
 
 /// What is asked for.
@@ -80,12 +80,30 @@ impl Request<'_> {
         let extension = Extension { overlay: None, not_carried: Vec::new() };
         let truck_files = Vec::new();
         let mut outcome = Outcome { drives_name, found, figures, extension, table, truck_files };
+        outcome.doubt();
         outcome.extend(self, &origin)?;
         Ok(outcome)
     }
 }
 
 impl Outcome {
+    /// Causes that make an error on the drives held out larger are not sure.
+    fn doubt(&mut self) {
+        let Self { found, figures, .. } = self;
+        for g in figures.gains.iter().filter(|g| g.lost) {
+            for cause in found.causes.iter_mut().filter(|c| g.blamed.contains(&c.id)) {
+                let doubt =
+                    format!(" Not sure: drives held out have more error in {}.", g.quantity);
+                if !cause.sentence.ends_with(&doubt) {
+                    cause.sentence.push_str(&doubt);
+                }
+                if found.verdict == Verdict::Explained {
+                    found.verdict = Verdict::Ambiguous;
+                }
+            }
+        }
+    }
+
     fn extend(&mut self, request: &Request<'_>, origin: &str) -> Result<(), DiagnosisError> {
         let name = file_name(&request.truck.name);
         let built_in = TruckParameters::names().any(|n| n == request.truck_name);
@@ -137,14 +155,14 @@ impl Outcome {
         if hypotheses().any(|h| h.is_at_bound(&models.after, &models.before)) {
             return Some("its size has run to a bound".to_owned());
         }
-        let shows = |g: &&GainInterval| {
-            let modules = hypotheses().flat_map(|h| h.groups()).flat_map(|g| g.modules());
-            g.lost && modules.into_iter().any(|m| m.quantity() == g.quantity)
-        };
-        let worse = self.figures.gains.iter().find(shows)?;
+        let mut lost = self.figures.gains.iter().filter(|g| g.lost);
+        let worse = lost.find(|g| g.blamed.contains(&cause.id))?;
         Some(format!(
-            "on the drives held out the error of {} grows from {:.4} to {:.4}",
-            worse.quantity, worse.before, worse.after
+            "on the drives held out the error of {} grows by {:.0} % ({:.3e} to {:.3e})",
+            worse.quantity,
+            -100.0 * worse.fall_frac,
+            worse.before,
+            worse.after
         ))
     }
 
@@ -185,6 +203,7 @@ impl Outcome {
             let lost = self.extension.not_carried.iter();
             let lost: Vec<Value> = lost.map(|n| json!({ "id": n.id, "why": n.why })).collect();
             all.insert("not_carried".to_owned(), lost.into());
+            all.insert("effects".to_owned(), serde_json::to_value(&self.figures.effects)?);
             if let Some(Value::Object(gain)) = all.get_mut("gain") {
                 gain.insert("errors".to_owned(), serde_json::to_value(&self.figures.gains)?);
             }

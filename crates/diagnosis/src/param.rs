@@ -99,6 +99,13 @@ pub(crate) struct Spec {
     pub(crate) calibration: f64,
 }
 
+impl Spec {
+    /// It multiplies the truck file's figure: reported as a factor, one without a cause.
+    pub(crate) fn is_factor(&self) -> bool {
+        self.key.ends_with("_scale") || self.key == "scale"
+    }
+}
+
 const fn s(
     p: P,
     key: &'static str,

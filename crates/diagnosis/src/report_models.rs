@@ -1,5 +1,6 @@
 //! The two models that a report compares: the truck file as calibrated, and the extended truck.
 
+use crate::hypothesis::CATALOGUE;
 use crate::param::{PARAMS, Theta};
 use crate::replay::MODULES;
 
@@ -12,6 +13,17 @@ pub struct Models {
     pub(crate) after: Theta,
     /// Standard deviation of the innovations of each module.
     pub(crate) sigma: [f64; MODULES],
+}
+
+impl Models {
+    /// The model with all causes but some.
+    pub(crate) fn without(&self, ids: &[&str]) -> Theta {
+        let mut theta = self.after;
+        for p in CATALOGUE.iter().filter(|h| ids.contains(&h.id)).flat_map(|h| h.params()) {
+            theta[p as usize] = self.before[p as usize];
+        }
+        theta
+    }
 }
 
 impl Default for Models {

@@ -94,6 +94,24 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
     }
 }
 
+/// The sentence of a cause with the 90 % interval of its size `x`, which has the unit of its
+/// parameter: of what has no unit, or is counted per something, in per cent.
+pub(crate) fn with_interval(sentence: String, x: f64, sigma: f64, unit: &str) -> String {
+    let (size, half) = (x.abs(), Z90 * sigma);
+    let (ends, unit) = if unit.starts_with('1') {
+        ([100.0 * (size - half), 100.0 * (size + half)], "%")
+    } else {
+        ([size - half, size + half], unit)
+    };
+    let decimals = (1.0 - (ends[1] - ends[0]).max(1e-9).log10()).ceil().clamp(0.0, 6.0) as usize;
+    let [from, to] = ends.map(|e| format!("{e:.decimals$}"));
+    let interval = format!("{from} to {to} {unit}");
+    format!("{} (90 %: {}).", sentence.trim_end_matches('.'), interval.trim_end())
+}
+
+/// Half the width of a 90 % interval, in standard deviations of a normal distribution.
+const Z90: f64 = 1.645;
+
 /// Said of causes that leave much.
 pub(crate) const NOT_SURE: &str = " Not sure: it leaves what another cause would explain, or the \
     drives do not agree about its size.";
@@ -122,7 +140,8 @@ pub(crate) fn confusion(a: &str, b: &str, lost_nats: f64) -> String {
     } else {
         "both act on the same signals in these drives; repeat with other loads, speeds and grades"
     };
-    format!("{reason} (it explains the drives {lost_nats:.1} nats worse)")
+    let how = if lost_nats > 0.0 { "worse" } else { "better, but not beside what else was found" };
+    format!("{reason} (it explains the drives {:.1} nats {how})", lost_nats.abs())
 }
 
 /// Why a cause cannot be seen although its channels are there.
@@ -168,13 +187,12 @@ pub(crate) fn shape(s: &Shape) -> String {
             extreme.0
         );
     }
-    format!(
-        "{word} of {:.3} in the {} balance near {} = {:.4}",
-        extreme.1.abs(),
-        s.module.quantity(),
-        s.signal,
-        extreme.0
-    )
+    // the force balance is one of accelerations
+    let (size, what) = match s.module {
+        Module::Force => (format!("{:.3} m/s²", extreme.1.abs()), "force"),
+        m => (format!("{:.3}", extreme.1.abs()), m.quantity()),
+    };
+    format!("{word} of {size} in the {what} balance near {} = {:.4}", s.signal, extreme.0)
 }
 
 /// Where the residuals of a module are largest: the worst bin over speed, grade and time.
@@ -224,4 +242,20 @@ pub(crate) fn places(problem: &Problem<'_>, m: Module) -> String {
         }
     }
     if parts.is_empty() { "everywhere".to_owned() } else { parts.join(", ") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sentence_says_how_sure_its_size_is_in_the_words_of_its_size() {
+        let rolling = with_interval(cause("rolling_resistance", 0.19), 0.19, 0.026, "1");
+        assert_eq!(
+            rolling,
+            "Rolling resistance is 19 % higher than modelled (90 %: 14.7 to 23.3 %)."
+        );
+        let tail = with_interval(cause("headwind", -2.35), -2.35, 0.4, "m/s");
+        assert_eq!(tail, "A steady tailwind of 2.4 m/s acts in all drives (90 %: 1.7 to 3.0 m/s).");
+    }
 }

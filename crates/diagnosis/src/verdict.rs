@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::CauseKind;
 use crate::report_models::Models;
-use crate::{Detectable, Finding};
+use crate::{Detectable, DriveUse, Finding};
 
 /// What the search concludes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -165,6 +165,8 @@ pub struct Diagnosis {
     pub extended_truck: Option<String>,
     /// Tolerances were learned from a baseline; otherwise they are defaults.
     pub tolerances_from_baseline: bool,
+    /// The drives and what each was used for.
+    pub drives: Vec<DriveUse>,
     /// Defects of the data.
     pub findings: Vec<Finding>,
     /// The models that were compared.

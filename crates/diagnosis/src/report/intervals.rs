@@ -11,7 +11,9 @@ use serde::Serialize;
 
 use super::rows::Rows;
 use crate::gain::HORIZON_S;
+use crate::hypothesis::CATALOGUE;
 use crate::replay::Module;
+use crate::report_models::Models;
 use crate::{Diagnosis, Drive};
 
 /// Lower and upper end of a 90 % interval.
@@ -38,6 +40,8 @@ pub struct GainInterval {
     pub claimed: bool,
     /// The error grows beyond its interval, and on every drive.
     pub lost: bool,
+    /// Of a loss: the causes that have to go until it is gone, those with the least evidence first.
+    pub blamed: Vec<&'static str>,
 }
 
 /// Bootstrap samples.
@@ -63,6 +67,40 @@ pub(super) fn gains(held: &[Rows], found: &Diagnosis, seed: u64) -> Vec<GainInte
         g.claimed &= gain.significant;
     }
     out
+}
+
+/// Says which causes a loss comes from: those with the least evidence that act there, as many as
+/// have to go until it is gone. `rows` replays the drives held out with two models.
+pub(super) fn blame(
+    gains: &mut [GainInterval],
+    found: &Diagnosis,
+    seed: u64,
+    rows: &dyn Fn(&Models) -> Vec<Rows>,
+) {
+    let mut less = std::collections::BTreeMap::<Vec<&str>, Vec<Rows>>::new();
+    for g in gains.iter_mut().filter(|g| g.lost) {
+        let acts = |c: &&crate::Cause| {
+            let groups = CATALOGUE.iter().filter(|h| h.id == c.id).flat_map(|h| h.groups());
+            groups.flat_map(|g| g.modules()).any(|m| m.quantity() == g.quantity)
+        };
+        // They are in the order of their evidence.
+        for cause in found.causes.iter().rev().filter(acts) {
+            g.blamed.push(cause.id);
+            let held = less.entry(g.blamed.clone()).or_insert_with(|| {
+                rows(&Models { after: found.models.without(&g.blamed), ..found.models })
+            });
+            let module = Module::ALL.into_iter().find(|m| m.quantity() == g.quantity);
+            let windows: Vec<Vec<Window>> = match module {
+                Some(m) if g.horizon_s <= 0.0 => {
+                    held.iter().map(|r| module_windows(r, m)).collect()
+                }
+                _ => held.iter().map(speed_windows).collect(),
+            };
+            if !interval(g.quantity, g.title, g.horizon_s, &windows, seed).is_some_and(|g| g.lost) {
+                break;
+            }
+        }
+    }
 }
 
 fn speed_windows(r: &Rows) -> Vec<Window> {
@@ -136,6 +174,7 @@ fn interval(
         fall_frac_interval,
         claimed: fall_frac_interval[0] > 0.0 && fall_frac > LEAST_FALL_FRAC,
         lost: fall_frac_interval[1] < 0.0 && fall_frac < -LEAST_FALL_FRAC && everywhere,
+        blamed: Vec::new(),
     })
 }
 

@@ -1,10 +1,11 @@
 //! One drive replayed before and after: residuals per module in physical units, and the speed of
 //! free runs.
 
+use crate::Plant;
 use crate::gain::drive_error_by;
 use crate::problem::replay;
 use crate::replay::{MODULES, Module, Prepared, Residuals};
-use crate::{Diagnosis, Plant};
+use crate::report_models::Models;
 
 /// A drive with its residuals under both models.
 pub(super) struct Rows {
@@ -20,8 +21,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    pub(super) fn new(drive: Prepared, plant: &Plant, found: &Diagnosis) -> Self {
-        let m = &found.models;
+    pub(super) fn new(drive: Prepared, plant: &Plant, m: &Models) -> Self {
         let free_run = |theta| {
             let mut v = vec![f64::NAN; drive.n];
             drive_error_by(&drive, plant, theta, &mut |i, speed| {
@@ -67,6 +67,16 @@ impl Rows {
                 fall / (s * s)
             })
             .sum()
+    }
+
+    /// Mean squared residual with all causes, in units of the noise, of the module that is worst.
+    pub(super) fn left(&self) -> f64 {
+        let of = |m: Module| {
+            let s = self.sigma[m as usize].max(1e-12);
+            let (sum, rows) = self.of(m).fold((0.0, 0.0), |t, (_, _, a)| (t.0 + a * a, t.1 + 1.0));
+            sum / (s * s * f64::max(rows, 1.0))
+        };
+        Module::ALL.into_iter().map(of).fold(0.0, f64::max)
     }
 
     /// Sample in the middle of a row.

@@ -146,3 +146,22 @@ fn drives_held_out_confirm_a_cause_doubt_it_or_take_it_away() {
     assert_eq!(revised(0.0), (1, true));
     assert_eq!(revised(-0.2), (0, false));
 }
+
+/// Five drives ask for 0.2, one for 0.5: each says so, with what it knows.
+#[test]
+fn every_drive_says_which_size_it_alone_would_choose() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let mut problem = alike(6, &times(&columns[0].1, 0.2), &columns);
+    problem.drives[3].residual = times(&columns[0].1, 0.5);
+    let evidence: &dyn Evidence = &problem;
+    let set = [LinearProblem::cause(ROLLING)];
+    let fit = evidence.fit(&set, evidence.zero(), 0.0).unwrap();
+    let alone = evidence.alone(&fit);
+    assert_eq!(alone.len(), 6);
+    for (i, sizes) in alone.iter().enumerate() {
+        let expected = if i == 3 { 1.5 } else { 1.2 };
+        assert_eq!((sizes[0].id, sizes[0].parameter), (ROLLING, "coefficient_scale"));
+        assert!((sizes[0].value - expected).abs() < 1e-9, "{i}: {sizes:?}");
+        assert!((sizes[0].sigma - 1.0 / STRONG).abs() < 1e-9);
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use diagnosis::{Diagnosis, Outcome, TableTrial, Verdict};
+use diagnosis::{Diagnosis, Finding, Outcome, TableTrial, Verdict};
 use serde_json::{Value, json};
 
 use super::example::{ClosedLoop, Hidden};
@@ -51,6 +51,17 @@ impl Results {
     pub(super) fn sentences(&self, out: &Path) -> String {
         let Outcome { found, figures, extension, table, .. } = &self.outcome;
         let mut lines = vec![verdict(found)];
+        lines.extend(figures.gains.iter().filter(|g| g.lost).map(|g| {
+            format!(
+                "  WORSE by {:.0} % on drives held out: {} (error {:.2e} to {:.2e}, {}), because of {}",
+                -100.0 * g.fall_frac,
+                g.title,
+                g.before,
+                g.after,
+                g.quantity,
+                g.blamed.join(" and ")
+            )
+        }));
         for cause in &found.causes {
             lines.push(format!(
                 "  {} (probability {:.0} %, evidence {:.0} nats)",
@@ -58,6 +69,8 @@ impl Results {
                 100.0 * cause.probability,
                 cause.evidence
             ));
+            let effects = figures.effects.iter().filter(|e| e.id == cause.id);
+            lines.extend(effects.map(|e| format!("    {}", e.sentence)));
             lines.push(format!("    {}", diagnosis::report::advice(cause.id)));
             for other in &cause.confused_with {
                 let percent = 100.0 * other.probability;
@@ -93,6 +106,7 @@ impl Results {
         for n in &extension.not_carried {
             lines.push(format!("Not in the extended truck: {} ({})", n.id, n.why));
         }
+        lines.extend(defects(&found.findings));
         if !found.tolerances_from_baseline {
             lines.push("Without a baseline the tolerances are defaults.".to_owned());
         }
@@ -118,6 +132,22 @@ impl Results {
         lines.join("\n")
     }
 }
+
+/// Defects of the data, a line each up to [`MOST_DEFECTS`], the rest counted.
+fn defects(findings: &[Finding]) -> Vec<String> {
+    let of = |f: &Finding| {
+        let channel = f.channel.as_ref().map_or_else(String::new, |c| format!(", {c}"));
+        let at = f.time_s.map_or_else(String::new, |t| format!(" at {t:.1} s"));
+        format!("Data: {}{channel}{at}: {} ({})", f.drive, f.kind, f.action)
+    };
+    let mut lines: Vec<String> = findings.iter().take(MOST_DEFECTS).map(of).collect();
+    if let Some(more) = findings.len().checked_sub(MOST_DEFECTS).filter(|n| *n > 0) {
+        lines.push(format!("Data: {more} more defects are in diagnosis.json"));
+    }
+    lines
+}
+
+const MOST_DEFECTS: usize = 12;
 
 /// What came of the table as a sentence.
 fn tried(table: &TableTrial) -> String {

@@ -1,6 +1,6 @@
 "use strict";
 const D = DATA.diagnosis, R = DATA.report;
-const BEFORE = "#d1495b", AFTER = "#0a7cc4", MEASURED = "#17202a", FLOOR = "#8a949e";
+const LOSS = "#b3261e", BEFORE = "#d1495b", AFTER = "#0a7cc4", MEASURED = "#17202a", FLOOR = "#8a949e";
 const byId = (id) => document.getElementById(id);
 const clear = (id) => byId(id).remove();
 const node = (tag, text, name) => {
@@ -59,9 +59,13 @@ function heading() {
     const t = node("div", undefined, "tile");
     t.append(node("b", value), node("span", what));
     tiles.append(t);
+    return t;
   };
   tile(words(D.verdict), "verdict");
   if (D.causes.length) tile(D.causes.map((c) => words(c.id)).join(" + "), D.causes.length > 1 ? "causes, by evidence" : "cause");
+  for (const g of R.gains.filter((g) => g.lost)) {
+    tile(`+${percent(-g.fall_frac)}`, `WORSE: error of ${label(g.quantity)} on held-out drives, ${fixed(g.before)} to ${fixed(g.after)}, because of ${g.blamed.map(words).join(" and ")}`).classList.add("loss");
+  }
   const best = R.gains.filter((g) => g.claimed).sort((a, b) => b.fall_frac - a.fall_frac)[0];
   if (best) tile(`−${percent(best.fall_frac)}`, `error of ${label(best.quantity)} on held-out drives (90 %: ${percent(best.fall_frac_interval[0])} to ${percent(best.fall_frac_interval[1])})`);
   else if (D.gain) tile("none claimed", "gain on held-out drives");
@@ -74,7 +78,14 @@ function why() {
   for (const c of D.causes) {
     const box = node("div", undefined, "cause");
     box.append(node("b", c.sentence));
+    for (const e of R.effects.filter((e) => e.id === c.id)) box.append(node("em", `On these drives: ${e.sentence.charAt(0).toLowerCase()}${e.sentence.slice(1)}`));
     box.append(node("em", DATA.advice[c.id]));
+    if (c.confused_with.length) {
+      box.append(node("em", `These drives leave alternatives (probability of this one ${percent(c.probability)}):`));
+      const list = node("ul");
+      for (const o of c.confused_with) list.append(node("li", `${words(o.id)}, ${percent(o.probability)}. To decide: ${o.why}`));
+      box.append(list);
+    }
     const sizes = Object.entries(c.parameters).map(([k, p]) => `${words(k)} ${fixed(p.value, 4)} ± ${fixed(p.sigma, 2)}${p.unit === "1" ? "" : " " + p.unit}`);
     box.append(node("small", `${words(c.id)} (${words(c.kind)}): ${sizes.join("; ")}; probability ${percent(c.probability)}, evidence ${fixed(c.evidence, 3)} nats`));
     where.append(box);
@@ -85,11 +96,13 @@ function why() {
     box.append(node("em", `It follows ${D.unknown.signals.map(label).join(", ")}. Look for something on the truck that acts with this signal and is not in the truck file.`));
     box.append(node("small", `A free function of ${label(D.unknown.signals[0] ?? "")} explains ${percent(D.unknown.explained_frac)} of what is left over the noise.`));
     where.append(box);
+    found();
   }
   if (!D.causes.length && !D.unknown) where.append(node("p", "No cause adds evidence beyond the tolerances of trucks, loads, weather and instruments."));
   const rungs = D.causes.map((c) => ({ name: words(c.id), nats: c.evidence, color: AFTER }));
   if (D.unknown?.evidence) rungs.push({ name: `free function of ${split(D.unknown.signals[0] ?? "")[0]}`, nats: D.unknown.evidence, color: "#8a5fbf" });
   if (!rungs.length) { clear("ladder"); return; }
+  byId("nats").textContent = "Evidence is the logarithm of how much more probable the measured data are with a cause than without it, in nats (natural logarithm): 3 nats are 20 to 1, 10 nats 22,000 to 1. It pays for the freedom of another size.";
   rungs.reverse();
   byId("ladder").style.height = `${110 + 34 * rungs.length}px`;
   Plotly.newPlot("ladder", [{ type: "bar", orientation: "h", x: rungs.map((r) => Math.max(r.nats, 1)), y: rungs.map((r) => r.name), marker: { color: rungs.map((r) => r.color) },
@@ -99,13 +112,29 @@ function why() {
     shapes: [{ type: "line", x0: 10, x1: 10, y0: 0, y1: 1, yref: "paper", line: { color: FLOOR, dash: "dot" } }] }, plain);
 }
 
+/** The function that was found, at its knots. */
+function found() {
+  const { table: knots, signals, shape, quantity } = D.unknown;
+  if (!knots.length) return;
+  const factor = shape.includes("off by a factor"), div = node("div", undefined, "plot");
+  byId("causes").append(div);
+  Plotly.newPlot(div, [{ type: "scatter", mode: "lines+markers", x: knots.map((k) => k[0]), y: knots.map((k) => factor ? 100 * k[1] : k[1]), line: { color: "#8a5fbf" } }],
+    { ...base, showlegend: false, xaxis: axis(label(signals[0])), yaxis: axis(factor ? `error of ${split(quantity)[0]}, %` : `error in the balance of ${split(quantity)[0]}`) }, plain);
+}
+
 function overlay() {
-  byId("shown").textContent = R.shown_drive_was_held_out
-    ? `Drive ${R.shown_drive}, which the search has not seen. The speed runs free for 60 s from every new start, driven by measured torque, gear and brake pressure; the others are two minutes where the extension matters most.`
-    : `Drive ${R.shown_drive} (no drive was held out). The speed runs free for 60 s from every new start; the others are two minutes where the models differ most.`;
+  byId("shown").textContent = "The speed runs free for 60 s from every new start, driven by measured torque, gear and brake pressure; the others are two minutes where the models differ most.";
+  for (const drive of R.shown) {
+    const role = { held_out: "not seen by the search", learned: "seen by the search: no drive was held out", baseline: "baseline" }[drive.role];
+    byId("traces").append(node("h3", `${drive.name} (${role}): ${drive.why}`));
+    overlays(drive.traces);
+  }
+}
+
+function overlays(traces) {
   const same = (t) => JSON.stringify(t.before) === JSON.stringify(t.after);
-  const changed = R.traces.filter((t) => !same(t));
-  for (const t of changed.length ? changed : R.traces) {
+  const changed = traces.filter((t) => !same(t));
+  for (const t of changed.length ? changed : traces.slice(0, 1)) {
     const div = node("div", undefined, "plot trace");
     byId("traces").append(div);
     const [name, unit] = split(t.quantity);
@@ -126,22 +155,23 @@ function gain() {
     clear("gain-plot");
     return;
   }
-  const claimed = R.gains.filter((g) => g.claimed);
+  const claimed = R.gains.filter((g) => g.claimed), lost = R.gains.filter((g) => g.lost);
   const names = D.gain.held_out.join(", ");
   byId("gain-text").textContent = claimed.length
     ? `On ${names} the extended truck is significantly better in ${claimed.map((g) => g.title.toLowerCase()).join("; ")}. Intervals are 90 %, from a bootstrap over windows of 60 s.`
     : `On ${names} no error falls significantly, so no gain is claimed. Intervals are 90 %, from a bootstrap over windows of 60 s.`;
+  if (lost.length) byId("gain-text").prepend(node("strong", `Worse on ${names}: ${lost.map((g) => `${g.title.toLowerCase()} (${fixed(g.before)} to ${fixed(g.after)} ${split(g.quantity)[1]})`).join("; ")}. `, "loss"));
   const shown = R.gains.filter((g) => Math.abs(g.fall_frac) > 1e-6).sort((a, b) => a.fall_frac - b.fall_frac);
   if (shown.length) {
     byId("gain-plot").style.height = `${110 + 30 * shown.length}px`;
-    Plotly.newPlot("gain-plot", [{ type: "scatter", mode: "markers", x: shown.map((g) => 100 * g.fall_frac), y: shown.map((g) => g.title), marker: { size: 11, color: shown.map((g) => g.claimed ? "#2f8f5b" : FLOOR) },
+    Plotly.newPlot("gain-plot", [{ type: "scatter", mode: "markers", x: shown.map((g) => 100 * g.fall_frac), y: shown.map((g) => g.title), marker: { size: 11, color: shown.map((g) => g.lost ? LOSS : g.claimed ? "#2f8f5b" : FLOOR) },
       error_x: { type: "data", symmetric: false, array: shown.map((g) => 100 * (g.fall_frac_interval[1] - g.fall_frac)), arrayminus: shown.map((g) => 100 * (g.fall_frac - g.fall_frac_interval[0])), color: "#51606f" },
       hovertemplate: "%{y}: %{x:.1f} %<extra></extra>" }],
-    { ...base, showlegend: false, xaxis: axis("fall of the rms error, % (green: claimed)", { zeroline: true, zerolinewidth: 2 }), yaxis: axis("", { showgrid: false }) }, plain);
+    { ...base, showlegend: false, xaxis: axis("fall of the rms error, % (green: claimed, red: worse)", { zeroline: true, zerolinewidth: 2 }), yaxis: axis("", { showgrid: false }) }, plain);
   } else clear("gain-plot");
   table("gain-table", [{ name: "Error" }, { name: "Before", number: true }, { name: "After", number: true }, { name: "Unit" }, { name: "Fall (90 %)", number: true }, { name: "Claimed" }],
     R.gains.map((g) => [g.horizon_s ? `${g.title}, ${g.horizon_s} s` : g.title, fixed(g.before), fixed(g.after), split(g.quantity)[1],
-      `${percent(g.fall_frac)} (${percent(g.fall_frac_interval[0])} to ${percent(g.fall_frac_interval[1])})`, g.claimed ? node("span", "yes", "yes") : g.lost ? "worse" : "no"]));
+      `${percent(g.fall_frac)} (${percent(g.fall_frac_interval[0])} to ${percent(g.fall_frac_interval[1])})`, g.claimed ? node("span", "yes", "yes") : g.lost ? node("span", "worse", "loss") : "no"]));
 }
 
 function loop() {
@@ -186,6 +216,21 @@ function maps() {
   draw();
 }
 
+const ROLES = { learned: "search", held_out: "held out", baseline: "baseline" };
+
+/** Every drive with its part, and the sizes that it alone would choose. */
+function drives() {
+  const sizes = D.causes.flatMap((c) => Object.keys(c.parameters).filter((k) => D.drives.some((d) => d.alone.some((a) => a.id === c.id && a.parameter === k))).map((k) => [c.id, k]));
+  const cell = (d, [id, k]) => {
+    const a = d.alone.find((a) => a.id === id && a.parameter === k);
+    return a ? `${fixed(a.value)} ± ${fixed(a.sigma, 2)}` : "–";
+  };
+  table("drives-table", [{ name: "Drive" }, { name: "Used for" }, { name: "Minutes", number: true }, { name: "km", number: true }, { name: "Mass, t", number: true }, { name: "Air, °C", number: true },
+    { name: "Speed error, m/s", number: true }, { name: "with causes", number: true }, ...sizes.map(([id, k]) => ({ name: `${words(id)} (${words(k)})`, number: true }))],
+  D.drives.map((d) => [d.name, ROLES[d.role], (d.duration_s / 60).toFixed(1), (d.distance_m / 1000).toFixed(1), (d.mass_kg / 1000).toFixed(1), fixed(d.air_mean_degc, 2), fixed(d.speed_rmse_before_m_s), fixed(d.speed_rmse_after_m_s), ...sizes.map((s) => cell(d, s))]));
+  if (sizes.length) byId("drives-table").append(node("p", "A size is what this drive alone would choose, the other sizes as found; ± is one standard deviation."));
+}
+
 function rest() {
   const confused = D.causes.flatMap((c) => c.confused_with.map((o) => [words(c.id), words(o.id), percent(o.probability), o.why]));
   if (confused.length) table("confused-table", [{ name: "Named" }, { name: "Could be" }, { name: "Probability", number: true }, { name: "Why, and what separates them" }], confused);
@@ -198,6 +243,7 @@ function rest() {
     table("unseen-table", [{ name: "Cause" }, { name: "Size" }, { name: "Smallest that shows", number: true }, { name: "Unit" }],
       D.detectable.map((d) => [words(d.id), words(d.parameter), fixed(d.smallest, 2), d.unit === "1" ? "" : d.unit]));
   }
+  drives();
   const shown = new Set(["drive", "channel", "time_s", "kind", "action"]);
   const found = D.findings.map((f) => [f.drive, f.channel ?? "", f.time_s === null ? "" : fixed(f.time_s, 5), words(f.kind),
     Object.entries(f).filter(([k]) => !shown.has(k)).map(([k, v]) => `${words(k)} ${v}`).join(", "), words(f.action)]);
