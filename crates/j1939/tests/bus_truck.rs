@@ -310,6 +310,20 @@ fn pedals_and_wheel_give_the_truck_to_the_driver_until_it_is_engaged_again() {
 }
 
 #[test]
+fn a_cab_that_says_no_pedal_is_down_does_not_hide_the_engine_s() {
+    // The story: engine and cab tell the pedal in turn, and the last word counted: a foot that the
+    // engine feels was never down for as long as an override takes.
+    for (engine_frac, cab_frac) in [(0.2, 0.0), (0.0, 0.2)] {
+        let mut yard = Yard::engaged();
+        yard.controllers.measured.accelerator_frac = engine_frac;
+        yard.controllers.measured.cab_accelerator_frac = Some(cab_frac);
+        yard.run(0.6);
+        assert_ne!(yard.truck.engagement(), Engagement::Engaged, "{engine_frac} {cab_frac}");
+        assert!(yard.truck.status().since(VehicleFault::DriverOverride).is_some());
+    }
+}
+
+#[test]
 fn a_single_wrong_message_is_no_foot() {
     // The story: one corrupted EEC2 looked like the driver's foot, and the truck was given to a driver
     // who was not there.

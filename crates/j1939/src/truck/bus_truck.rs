@@ -293,7 +293,7 @@ impl<B: Bus, P: PoseSource, S: SteeringLink> BusTruck<B, P, S> {
     fn driver_acts(&mut self, now: Time) -> bool {
         let c = &self.config;
         let beyond = |field: Option<Stamped<f64>>, frac| field.is_some_and(|f| f.value > frac);
-        let pedal = beyond(self.heard.accelerator_frac, c.driver_accelerator_frac)
+        let pedal = beyond(self.heard.accelerator_frac(), c.driver_accelerator_frac)
             || beyond(self.heard.brake_pedal_frac, c.driver_brake_frac)
             || self.heard.brake_pedal_pressed;
         let asked = self.steering.is_some() && self.clutch.state().actuates();

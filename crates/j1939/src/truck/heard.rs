@@ -28,8 +28,8 @@ pub(super) struct Heard {
     pub friction_frac: Option<Stamped<f64>>,
     pub reference_nm: Option<Stamped<f64>>,
     pub fuel_rate_m3_s: Option<Stamped<f64>>,
-    /// The farther of the pedals that are reported.
-    pub accelerator_frac: Option<Stamped<f64>>,
+    /// The farther of the pedals that the engine reports, and that the cab reports.
+    accelerators: [Option<Stamped<f64>>; 2],
     pub brake_pedal_frac: Option<Stamped<f64>>,
     pub brake_pedal_pressed: bool,
     /// XBR state (SPN 2917): 0 every demand, 1 the first priority alone, 2 none.
@@ -70,7 +70,20 @@ fn take<T>(now: Time, slot: Slot<T>, field: &mut Option<Stamped<T>>) {
     }
 }
 
+/// Two tellers of a pedal in turn: how long the word of one stands beside a newer one of the other,
+/// s. Four messages of the slower.
+const BOTH_TELL_S: f64 = 0.2;
+
 impl Heard {
+    /// The farther of the pedals that engine and cab report, as old as the newest report.
+    pub(super) fn accelerator_frac(&self) -> Option<Stamped<f64>> {
+        let told = || self.accelerators.into_iter().flatten();
+        let time = told().map(|pedal| pedal.time).max()?;
+        let fresh = told().filter(|pedal| time.seconds_since(pedal.time) <= BOTH_TELL_S);
+        let value = fresh.map(|pedal| pedal.value).reduce(f64::max)?;
+        Some(Stamped { time, value })
+    }
+
     /// Takes a frame, whatever it is.
     pub(super) fn on_frame(&mut self, now: Time, frame: &Frame, config: &BusTruckConfig) {
         self.frames += 1;
@@ -111,7 +124,9 @@ impl Heard {
                     .filter_map(Slot::value)
                     .reduce(f64::max);
                 if let Some(value) = farther {
-                    self.accelerator_frac = Some(Stamped { time: now, value });
+                    let [engine, cab] = &mut self.accelerators;
+                    let teller = if id.sa() == config.engine { engine } else { cab };
+                    *teller = Some(Stamped { time: now, value });
                 }
             }
             pgn if pgn == Vp1::TABLE.pgn => {
@@ -299,7 +314,7 @@ impl Heard {
             SafetySignal::Brakes => {
                 Some(time(self.brake_pedal_frac)?.min(self.xbr_state.map(|state| state.time)?))
             }
-            SafetySignal::Pedals => time(self.accelerator_frac),
+            SafetySignal::Pedals => time(self.accelerator_frac()),
             SafetySignal::Pose => None,
         }
     }

@@ -45,6 +45,8 @@ pub struct Measured {
     pub friction_nm: f64,
     pub fuel_m3_s: f64,
     pub accelerator_frac: f64,
+    /// What the cab says of a pedal; nothing where it has none.
+    pub cab_accelerator_frac: Option<f64>,
     pub brake_pedal_frac: f64,
     pub gear: i16,
     pub retarder_frac: f64,
@@ -67,6 +69,7 @@ impl Default for Measured {
             friction_nm: 150.0,
             fuel_m3_s: 8e-6,
             accelerator_frac: 0.0,
+            cab_accelerator_frac: None,
             brake_pedal_frac: 0.0,
             gear: 12,
             retarder_frac: 0.0,
@@ -154,7 +157,8 @@ impl Controllers {
                 Eec2 { accelerator_pedal_frac: Slot::Value(m.accelerator_frac), ..Eec2::default() };
             self.put(now, &eec2, 0x00);
             // A cab that has no pedal says so
-            self.put(now, &Eec2::default(), 0x31);
+            let cab = m.cab_accelerator_frac.map_or(Slot::NotAvailable, Slot::Value);
+            self.put(now, &Eec2 { accelerator_pedal_frac: cab, ..Eec2::default() }, 0x31);
         }
         if self.tick % 10 == 0 {
             self.slow(now);
