@@ -20,6 +20,8 @@ const SLOWEST_STEP_S: f64 = 5.0;
 const MAX_BAD_FRAC: f64 = 0.02;
 /// A channel that must move and does not for this long while the truck drives is stuck, s.
 const STUCK_S: f64 = 30.0;
+/// Spread of a road speed that is held, m/s: an engine speed in whole steps rests then.
+const HELD_M_S: f64 = 0.05;
 
 pub(super) fn to_grid(
     name: &str,
@@ -324,7 +326,8 @@ fn stuck(drive: &mut Drive, speed: &[f64], note: &mut Note<'_>) {
                 continue;
             }
             let run = i - from;
-            if run as f64 * Drive::STEP_S > STUCK_S {
+            let rests = channel == Channel::EngineSpeedRpm && is_held(&speed[from..i]);
+            if run as f64 * Drive::STEP_S > STUCK_S && !rests {
                 total += run;
                 if run > longest {
                     (longest, at) = (run, from);
@@ -345,6 +348,13 @@ fn stuck(drive: &mut Drive, speed: &[f64], note: &mut Note<'_>) {
     }
 }
 
+/// Whether a road speed is held: cruise control on an even road.
+fn is_held(speed: &[f64]) -> bool {
+    let (low, high) =
+        speed.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, v| (a.0.min(*v), a.1.max(*v)));
+    high - low < HELD_M_S
+}
+
 /// Grade and curvature at the map position, where the table does not carry them.
 pub(super) fn fill_from_map(drive: &mut Drive) {
     let (Some(s), Some(map)) = (drive.get(Channel::SMapM).map(<[f64]>::to_vec), drive.map.clone())
@@ -360,5 +370,25 @@ pub(super) fn fill_from_map(drive: &mut Drive) {
             let v = s.iter().map(|s| curve.at(*s)).collect();
             drive.set(channel, v);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_engine_speed_rests_while_the_road_speed_is_held_and_else_it_is_stuck() {
+        let stuck_with = |swing_m_s: f64| {
+            let mut drive = Drive::new("d", 0.0, 2000);
+            let speed: Vec<f64> =
+                (0..2000).map(|i| 22.0 + swing_m_s * libm::sin(0.01 * f64::from(i))).collect();
+            drive.set(Channel::EngineSpeedRpm, vec![1141.0; 2000]);
+            let mut found = 0;
+            stuck(&mut drive, &speed, &mut |_, _, _, _| found += 1);
+            (found, drive.has(Channel::EngineSpeedRpm))
+        };
+        assert_eq!(stuck_with(0.01), (0, true));
+        assert_eq!(stuck_with(1.0), (1, false));
     }
 }

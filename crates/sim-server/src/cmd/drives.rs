@@ -50,9 +50,9 @@ pub(crate) struct Args {
     /// that do not say where on earth they lie.
     #[arg(long, value_name = "M", requires = "map", value_parser = not_negative)]
     start_s_m: Option<f64>,
-    /// Mass on the load sheet; without it what the bus says (CVW).
-    #[arg(long, value_name = "M", value_parser = positive)]
-    mass_kg: Option<f64>,
+    /// Mass on the load sheet, one for all logs or one for each; without it what the bus says (CVW).
+    #[arg(long, value_name = "M,…", value_delimiter = ',', value_parser = positive)]
+    mass_kg: Vec<f64>,
     /// A standstill of so long ends a drive.
     #[arg(long, value_name = "S", default_value = "120", value_parser = positive)]
     standstill_s: f64,
@@ -105,9 +105,15 @@ pub(crate) fn run(command: &Command) -> Result<(), Failure> {
     let limits = model.vehicle_limits().map_err(Failure::input)?;
     let map = args.map.as_deref().map(|m| Map::load(m, args.start_s_m)).transpose()?;
     let names = drive_names(&args.logs)?;
+    let masses = args.mass_kg.len();
+    if masses > 1 && masses != args.logs.len() {
+        let logs = args.logs.len();
+        return Err(Failure::Input(format!("--mass-kg: {masses} masses for {logs} logs")));
+    }
     let out = args.out.folder(RESULTS)?;
     let (mut tables, mut logs) = (Vec::new(), Vec::new());
-    for (path, name) in args.logs.iter().zip(names) {
+    for (number, (path, name)) in args.logs.iter().zip(names).enumerate() {
+        let mass_kg = args.mass_kg.get(number).or(args.mass_kg.first()).copied();
         let (log, channels) = heard(path)?;
         let locate =
             |lat: f64, lon: f64, hint_m: Option<f64>| map.as_ref()?.station_m(lat, lon, hint_m);
@@ -121,7 +127,7 @@ pub(crate) fn run(command: &Command) -> Result<(), Failure> {
             }),
         };
         let made = log.convert(&how).map_err(|e| Failure::file(path, e))?;
-        logs.push(put(path, &name, made, args, channels, &mut tables));
+        logs.push(put(path, &name, made, mass_kg, channels, &mut tables));
     }
     if tables.is_empty() {
         let why = logs.iter().flat_map(|l| &l.left_out).map(|l| l.why.as_str());
@@ -179,11 +185,11 @@ fn put(
     path: &Path,
     name: &str,
     made: Converted,
-    args: &Args,
+    given_kg: Option<f64>,
     channels: usize,
     tables: &mut Vec<Table>,
 ) -> LogReport {
-    let (mass_kg, mass_from) = match (args.mass_kg, made.mass_kg) {
+    let (mass_kg, mass_from) = match (given_kg, made.mass_kg) {
         (Some(kg), _) => (Some(kg), "--mass-kg"),
         (None, Some(kg)) => (Some(kg), "CVW"),
         (None, None) => (None, "nobody: the truck file's"),
