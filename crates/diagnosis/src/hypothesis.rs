@@ -51,7 +51,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h(
         "wind",
         &[P::WindX, P::WindY],
-        &[],
+        &[P::WindShare],
         ONE,
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::HeadingRad],
         2.0,
@@ -307,7 +307,15 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.06,
         0.0,
     ),
-    h("crosswind", &[P::Crosswind], &[], ONE, &[C::SteeringWheelRad, C::YawRateRadS], 1.0, 0.0),
+    h(
+        "crosswind",
+        &[P::Crosswind],
+        &[P::CrosswindShare],
+        ONE,
+        &[C::SteeringWheelRad, C::YawRateRadS],
+        1.0,
+        0.0,
+    ),
 ];
 
 impl Hypothesis {

@@ -59,6 +59,9 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("headwind", "headwind_m_s") => Plus("resistance.headwind_m_s", 1.0),
         ("wind", "wind_to_x_m_s") => Plus("resistance.wind_to_x_m_s", 1.0),
         ("wind", "wind_to_y_m_s") => Plus("resistance.wind_to_y_m_s", 1.0),
+        ("wind" | "crosswind", "tractor_share_offset_frac") => {
+            Plus("resistance.side_force_tractor_frac", 1.0)
+        }
         ("mass", "mass_scale") => Times("instruments.mass_scale_coeff"),
         ("grade_bias", "grade_frac") => Plus("instruments.grade_bias_frac", 1.0),
         ("map_shift", "shift_m") => Plus("instruments.map_shift_m", 1.0),

@@ -75,10 +75,12 @@ pub(crate) enum P {
     TurboStart,
     SteerDelay,
     BrakeLoad,
+    WindShare,
+    CrosswindShare,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 66;
+pub(crate) const PARAMS: usize = 68;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -193,6 +195,9 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::TurboStart, "threshold_offset_frac", "1", (0.1, -0.3, 0.4, 0.02), 0.0, 0.0),
     s(P::SteerDelay, "pure_delay_frac", "1", (0.5, 0.0, 1.0, 0.1), 0.0, 0.0),
     s(P::BrakeLoad, "load_estimate_scale", "1", (0.15, -0.6, 1.5, 0.02), 0.15, 0.0),
+    // Where the side force acts: its moments go with the share that is not on the tractor.
+    s(P::WindShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
+    s(P::CrosswindShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -221,6 +226,8 @@ impl Spec {
                 | P::StiffnessFollowsMass
                 | P::TurboStart
                 | P::SteerDelay
+                | P::WindShare
+                | P::CrosswindShare
         )
     }
 }

@@ -150,7 +150,8 @@ fn a_wrong_load_is_named_beside_much_free_play() {
 #[test]
 fn a_light_wind_is_fitted_whatever_its_signs() {
     for (turn, seed) in [(0.1, 51), (0.4, 52), (0.6, 53), (0.9, 54)] {
-        let shape = Shape([turn; 4]);
+        // The side force acts as the truck file says.
+        let shape = Shape([turn, 1.0 / 3.0, 0.5, 0.5]);
         let hidden = [Effect::Cause { id: "wind", size: 2.8, shape }];
         let d = judge(&drives(&hidden, seed)).unwrap();
         assert_eq!(named(&d), ["wind"], "{turn} {:?}", d.verdict);
@@ -158,4 +159,18 @@ fn a_light_wind_is_fitted_whatever_its_signs() {
         let wind = p["wind_to_x_m_s"].value.hypot(p["wind_to_y_m_s"].value);
         assert!((wind - 2.8).abs() < 1.0, "{turn}: {wind}");
     }
+}
+
+/// A side force that acts further forward than the truck file says turned the tractor more, and was
+/// a wind of twice the speed with softer tyres beside it.
+#[test]
+fn a_wind_that_acts_further_forward_is_not_a_stronger_wind() {
+    let shape = Shape([0.4, 0.9, 0.5, 0.5]);
+    let d = judge(&drives(&[Effect::Cause { id: "wind", size: 5.5, shape }], 57)).unwrap();
+    assert_eq!(named(&d), ["wind"], "{:?}", d.verdict);
+    let p = &d.causes[0].parameters;
+    let wind = p["wind_to_x_m_s"].value.hypot(p["wind_to_y_m_s"].value);
+    assert!((wind - 5.5).abs() < 0.8, "{wind}");
+    let share = p["tractor_share_offset_frac"];
+    assert!((share.value - 0.17).abs() < 4.0 * share.sigma, "{share:?}");
 }

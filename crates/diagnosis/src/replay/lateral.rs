@@ -116,7 +116,9 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
         &system.trailer,
         -model.trailer_mass_kg * bank_m_s2,
     );
-    let share = plant.truck.resistance.side_force_tractor_frac;
+    let share = plant.truck.resistance.side_force_tractor_frac
+        + t[P::WindShare as usize]
+        + t[P::CrosswindShare as usize];
     let wind = plus(&system.tractor.map(|b| share * b), &system.trailer, 1.0 - share);
     let side_force = SideForce::new(d, plant, t);
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);

@@ -207,6 +207,8 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::PayloadX
         | P::StiffnessFollows
         | P::StiffnessFollowsMass
+        | P::WindShare
+        | P::CrosswindShare
         | P::Bank
         | P::AccelYBias
         | P::TrailerYawBias => &[G::Lateral],

@@ -176,8 +176,8 @@ pub(crate) fn drive(
         delta += (target - delta) * (1.0 - (-STEP_S / f.steer_lag_s.max(0.01)).exp());
         let rolled = v.max(3.0);
         let force = [
-            0.25 * blown + a.side_n[0] - tractor_kg * G * f.bank_rad,
-            0.75 * blown + a.side_n[1] - trailer_kg * G * f.bank_rad,
+            f.side_share * blown + a.side_n[0] - tractor_kg * G * f.bank_rad,
+            (1.0 - f.side_share) * blown + a.side_n[1] - trailer_kg * G * f.bank_rad,
         ];
         if i % 5 == 0 {
             let side = bodies.rate(&lateral, rolled, delta, force)[0] + rolled * lateral[1];

@@ -111,6 +111,7 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
             "wind" => {
                 let (sin, cos) = shape.at(0, 0.0, core::f64::consts::TAU).sin_cos();
                 f.wind = [f.wind[0] + x * cos, f.wind[1] + x * sin];
+                f.side_share = shape.at(1, 0.15, 0.45);
             }
             "mass" => {
                 f.mass_scale *= 1.0 + x;
@@ -150,7 +151,10 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
                 f.tyres_follow = shape.choice(0, 2) == 1;
             }
             "road_bank" => f.bank_rad += x,
-            "crosswind" => f.crosswind += x,
+            "crosswind" => {
+                f.crosswind += x;
+                f.side_share = shape.at(1, 0.15, 0.45);
+            }
             _ => {}
         }
     }

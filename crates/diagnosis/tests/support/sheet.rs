@@ -89,6 +89,8 @@ pub(crate) struct Figures {
     pub(crate) headwind: f64,
     pub(crate) crosswind: f64,
     pub(crate) wind: [f64; 2],
+    /// Part of the side force that acts on the tractor.
+    pub(crate) side_share: f64,
     pub(crate) grade_bias: f64,
     pub(crate) map_shift_m: f64,
     pub(crate) speed_scale: f64,
@@ -127,6 +129,7 @@ impl Figures {
         headwind: 0.0,
         crosswind: 0.0,
         wind: [0.0; 2],
+        side_share: 0.25,
         grade_bias: 0.0,
         map_shift_m: 0.0,
         speed_scale: 1.0,
