@@ -1,8 +1,10 @@
 #!/usr/bin/env bash
-# The program on the truck for AArch64 Linux: its size, its unit tests under qemu-user, and the same
-# bits as on this computer. The argument is the built test `same_bits`.
+# The program on the truck for AArch64 Linux under qemu-user: its size, its unit tests, the same bits
+# as on this computer, and a drive of the virtual truck whose recording this computer repeats. The
+# arguments are the built tests `same_bits` and `two_processes`.
 set -euo pipefail
 host=$(realpath "${1:?the test binary same_bits}")
+drives=$(realpath "${2:?the test binary two_processes}")
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 target=aarch64-unknown-linux-gnu
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
@@ -26,3 +28,5 @@ else
   echo "other bits than on this computer (above: < this one, > AArch64)"
   exit 1
 fi
+TRUCK_NODE="qemu-aarch64-static -L /usr/aarch64-linux-gnu $(realpath "${CARGO_TARGET_DIR:-target}")/$target/release/truck-node" \
+  timeout 180 "$drives" --nocapture drives_and_stops_over_a_server

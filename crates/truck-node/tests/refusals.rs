@@ -134,7 +134,7 @@ fn an_interface_without_permission_is_named() {
     let files = Files::new(3.0);
     let mut denied = Command::new("python3");
     let support = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/support/no_can.py");
-    denied.arg(support).arg(node().get_program());
+    denied.arg(support).arg(node().get_program()).args(node().get_args());
     let line = refusal(&run_as(denied, &files, &["--can", "lo"]));
     assert!(line.contains("--can lo: no permission to open a CAN socket"), "{line}");
 }

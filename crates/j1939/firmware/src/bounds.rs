@@ -4,7 +4,7 @@
 /// Code and constants, bytes.
 pub const TEXT_BYTES: usize = 560_000;
 /// Stack, bytes.
-pub const STACK_BYTES: usize = 52_700;
+pub const STACK_BYTES: usize = 54_000;
 
 /// What the ticks of a drive cost.
 #[derive(Debug)]
@@ -33,13 +33,13 @@ pub const CRUISE: Cost = Cost {
     heap_bytes: 79_400,
 };
 
-/// Predictive among cars: only a speed plan allocates.
+/// Predictive among cars: only a speed plan allocates, and the first tick.
 pub const PREDICTIVE: Cost = Cost {
     mean: 1_211_000,
     worst_tick: 2_077_000,
     worst_plan: 359_000_000,
     allocating_ticks: 2,
-    allocations: 2_671,
+    allocations: 2_672,
     heap_bytes: 1_009_000,
 };
 
@@ -49,7 +49,7 @@ pub const HILLS: Cost = Cost {
     worst_tick: 2_395_000,
     worst_plan: 612_000_000,
     allocating_ticks: 2,
-    allocations: 2_718,
+    allocations: 2_719,
     heap_bytes: 1_165_000,
 };
 

@@ -29,10 +29,18 @@ pub(crate) struct SpeedBounds {
 }
 
 /// Speed reference from a station on.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(crate) struct ReferenceSpeed {
     points: Vec<SpeedPoint>,
     profile: Vec<ProfilePoint>,
+    /// What limits, curves and the lane's end allow at the points, m/s.
+    held_m_s: [f64; POINTS],
+}
+
+impl Default for ReferenceSpeed {
+    fn default() -> Self {
+        Self { points: Vec::new(), profile: Vec::new(), held_m_s: [0.0; POINTS] }
+    }
 }
 
 impl ReferenceSpeed {
@@ -65,13 +73,27 @@ impl ReferenceSpeed {
             .get(usize::from(lane))
             .filter(|l| l.end != LaneEnd::Continues)
             .map_or(f64::INFINITY, |l| l.s_end_m - geometry.front_m - STOP_BEFORE_END_M);
-        self.points.clear();
-        self.points.extend((0..POINTS).map(|i| {
-            let s = s_m + i as f64 * STEP_M;
+        for (i, allowed) in self.held_m_s.iter_mut().enumerate() {
             let held = self.profile[i..=i + behind].iter().map(cap).fold(f64::INFINITY, f64::min);
-            let wanted = planned(s).unwrap_or(bounds.set_speed_m_s);
-            let speed_m_s = if s < lane_end_m { wanted.min(held) } else { 0.0 };
-            SpeedPoint { s_m: s, speed_m_s, accel_m_s2: 0.0 }
+            *allowed = if s_m + (i as f64) * STEP_M < lane_end_m { held } else { 0.0 };
+        }
+        self.rise(s_m, |s| planned(s).unwrap_or(bounds.set_speed_m_s));
+    }
+
+    /// Recomputes the reference from what limits, curves and the lane's end allow another one, with
+    /// another set speed.
+    pub(crate) fn update_like(&mut self, other: &Self, set_speed_m_s: f64) {
+        let Some(first) = other.points.first() else { return };
+        self.held_m_s = other.held_m_s;
+        self.rise(first.s_m, |_| set_speed_m_s);
+    }
+
+    /// As fast as is wanted and allowed, with a comfortable deceleration towards what is lower.
+    fn rise(&mut self, s_m: f64, wanted_m_s: impl Fn(f64) -> f64) {
+        self.points.clear();
+        self.points.extend(self.held_m_s.iter().enumerate().map(|(i, held)| {
+            let s_m = s_m + i as f64 * STEP_M;
+            SpeedPoint { s_m, speed_m_s: wanted_m_s(s_m).min(*held), accel_m_s2: 0.0 }
         }));
         for i in (0..POINTS - 1).rev() {
             let ahead = self.points[i + 1].speed_m_s;

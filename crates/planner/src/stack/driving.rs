@@ -167,11 +167,6 @@ impl Stack {
             obey_speed_limits: self.config.obey_speed_limits,
             curve_accel_m_s2: self.config.curve_accel_m_s2,
         };
-        if self.may_overspeed() || self.plans_ahead() {
-            let over_m_s = if self.may_overspeed() { self.config.overspeed_m_s } else { 0.0 };
-            let allowed = SpeedBounds { set_speed_m_s: bounds.set_speed_m_s + over_m_s, ..bounds };
-            self.ceiling.update(road, lane, ego.s_m, &limits.geometry, &allowed, |_| None);
-        }
         let profile = match self.config.speed_planner {
             SpeedPlannerKind::Predictive => self.profile.as_ref(),
             SpeedPlannerKind::Cruise => None,
@@ -182,6 +177,10 @@ impl Stack {
             None => profile.and_then(|p| p.at(s_m)),
         };
         self.reference.update(road, lane, ego.s_m, &limits.geometry, &bounds, planned);
+        if self.may_overspeed() || self.plans_ahead() {
+            let over_m_s = if self.may_overspeed() { self.config.overspeed_m_s } else { 0.0 };
+            self.ceiling.update_like(&self.reference, bounds.set_speed_m_s + over_m_s);
+        }
         self.plan.speed_status = match (self.config.speed_planner, profile) {
             (SpeedPlannerKind::Cruise, _) => PlanStatus::Cruise,
             (SpeedPlannerKind::Predictive, None) => self.speed.status(ego.s_m),

@@ -21,8 +21,14 @@ pub const PATIENCE: Duration = Duration::from_secs(60);
 
 const GEO: &str = "+proj=utm +zone=32 +ellps=WGS84 +units=m +no_defs";
 
+/// Our program; `TRUCK_NODE` names a command in its place: `tools/arm64.sh` an emulator with the
+/// program of another processor.
 pub fn node() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_truck-node"))
+    let given = std::env::var("TRUCK_NODE").unwrap_or_default();
+    let mut words = given.split_whitespace();
+    let mut node = Command::new(words.next().unwrap_or(env!("CARGO_BIN_EXE_truck-node")));
+    node.args(words);
+    node
 }
 
 /// The program beside ours.
