@@ -1,5 +1,6 @@
 //! Words for a truck engineer.
 
+use crate::identify::SIGMAS_90;
 use crate::problem::Problem;
 use crate::replay::{Module, Prepared};
 use crate::unknown::Shape;
@@ -97,7 +98,7 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
 /// The sentence of a cause with the 90 % interval of its size `x`, which has the unit of its
 /// parameter: of what has no unit, or is counted per something, in per cent.
 pub(crate) fn with_interval(sentence: String, x: f64, sigma: f64, unit: &str) -> String {
-    let (size, half) = (x.abs(), Z90 * sigma);
+    let (size, half) = (x.abs(), SIGMAS_90 * sigma);
     let (ends, unit) = if unit.starts_with('1') {
         ([100.0 * (size - half), 100.0 * (size + half)], "%")
     } else {
@@ -108,9 +109,6 @@ pub(crate) fn with_interval(sentence: String, x: f64, sigma: f64, unit: &str) ->
     let interval = format!("{from} to {to} {unit}");
     format!("{} (90 %: {}).", sentence.trim_end_matches('.'), interval.trim_end())
 }
-
-/// Half the width of a 90 % interval, in standard deviations of a normal distribution.
-const Z90: f64 = 1.645;
 
 /// Said of causes that leave much.
 pub(crate) const NOT_SURE: &str = " Not sure: it leaves what another cause would explain, or the \

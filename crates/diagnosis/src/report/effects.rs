@@ -27,8 +27,6 @@ pub struct Effect {
     pub sentence: String,
 }
 
-/// Density of diesel fuel, g/l (EN 590, middle of 820 to 845).
-const DIESEL_G_PER_L: f64 = 832.0;
 /// Torque of the engine, part of the reference torque, above which it pays for a force.
 const PULLS_PERCENT: f64 = 3.0;
 /// Part of the root mean square that the mean must have for the change to have a direction.
@@ -68,6 +66,8 @@ struct Sums {
 pub(super) fn effects(drives: &[&Prepared], plant: &Plant, found: &Diagnosis) -> Vec<Effect> {
     let distance_m: f64 = drives.iter().map(|d| d.speed.iter().sum::<f64>() * Drive::STEP_S).sum();
     let mean_t = drives.iter().map(|d| 1e-3 * d.mass_kg).sum::<f64>() / drives.len().max(1) as f64;
+    // kg/m³ are g/l
+    let fuel_g_l = plant.truck.engine.fuel.density_kg_m3;
     let of = |cause: &crate::Cause| {
         let sums = sums(drives, plant, &found.models, cause.id);
         let (m, s) = Module::ALL
@@ -76,7 +76,7 @@ pub(super) fn effects(drives: &[&Prepared], plant: &Plant, found: &Diagnosis) ->
             .filter(|(_, s)| s.rows > 0.0 && s.squares > 0.0)
             .max_by(|a, b| a.1.loud.total_cmp(&b.1.loud))?;
         let fuel = matches!(m, Module::Force | Module::Fuel)
-            .then(|| s.fuel_g / DIESEL_G_PER_L / (1e-5 * distance_m).max(1e-9));
+            .then(|| s.fuel_g / fuel_g_l / (1e-5 * distance_m).max(1e-9));
         Some(effect(cause.id, m, &s, fuel, mean_t))
     };
     found.causes.iter().filter_map(of).collect()
