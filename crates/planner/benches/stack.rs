@@ -5,10 +5,10 @@
 mod data_sheet;
 
 use std::hint::black_box;
-use std::sync::Arc;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use planner::decider::Policy;
+use planner::decider::observation::ObservationSpec;
 use planner::safety::{Gate, GateView, RssConfig};
 use planner::steering::{LaneChangeConfig, LateralPath, Start, plan_change};
 use planner::{DeciderKind, LaneChoice, Stack, StackConfig};
@@ -137,10 +137,13 @@ fn policy(c: &mut Criterion) {
         })
         .collect();
     let actions = [LaneChoice::Left, LaneChoice::Keep, LaneChoice::Right];
-    let policy = Arc::new(Policy::new(&layers, actions).unwrap());
+    let policy = Policy::new(ObservationSpec::Paper216, &layers, actions).unwrap();
     let mut x = [0.0; 216];
     x.iter_mut().for_each(|v| *v = random());
-    c.bench_function("policy 216-256-512-256-3", |b| b.iter(|| policy.values(black_box(&x))));
+    let mut scratch = policy.scratch();
+    c.bench_function("policy 216-256-512-256-3", |b| {
+        b.iter(|| policy.values(black_box(&x), &mut scratch));
+    });
 }
 
 criterion_group!(benches, planning, tick, policy);

@@ -35,6 +35,7 @@ mod error;
 pub mod localise;
 pub mod pcc;
 pub mod safety;
+mod situation;
 pub mod speed;
 mod stack;
 pub mod steering;
@@ -45,8 +46,9 @@ mod testing;
 pub use decider::{DeciderKind, LaneChoice};
 pub use drive::{DriveError, TickOutcome, drive_tick};
 pub use error::PlannerError;
+pub use situation::Situation;
 pub use speed::SpeedProfile;
-pub use stack::{RatesConfig, SpeedPlannerKind, Stack, StackConfig};
+pub use stack::{RatesConfig, SpeedPlannerKind, Stack, StackConfig, TacticalPlan, Tactics};
 
 /// Angle in -pi..pi.
 pub(crate) fn wrapped(angle_rad: f64) -> f64 {

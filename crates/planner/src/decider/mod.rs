@@ -20,7 +20,7 @@ use keep_right::STAY_S;
 pub(crate) use keep_right::keep_right;
 pub use mobil::MobilConfig;
 pub(crate) use mobil::{leaving_gap_m, mobil};
-pub use policy::Policy;
+pub use policy::{Policy, Scratch};
 pub(crate) use rules::rules;
 
 use crate::PlannerError;

@@ -5,7 +5,8 @@
 //! `layers.<i>.bias`, and `policy.json` with at least
 //! `{"schema": 1, "observation_hash": "<16 hex digits>", "actions": ["left", "keep", "right"],
 //! "weights_sha256": "<64 hex digits>"}`; more keys (training revision, evaluation) are kept out of
-//! the decision. A policy trained on another observation, or torn weights, are refused.
+//! the decision. The hash says which [`ObservationSpec`] the policy was trained on; one trained on
+//! another observation, or torn weights, are refused.
 
 use alloc::format;
 use alloc::vec;
@@ -13,7 +14,7 @@ use alloc::vec::Vec;
 
 use super::LaneChoice;
 use crate::PlannerError;
-use crate::decider::observation;
+use crate::decider::observation::ObservationSpec;
 
 /// Largest accepted layer.
 const WIDTH_MAX: usize = 8192;
@@ -26,25 +27,71 @@ struct Layer {
     bias: Vec<f32>,
 }
 
-/// A network and the meaning of its outputs.
+/// Columns that are added up together: each sum is read and written once for all of them.
+const TOGETHER: usize = 4;
+
+impl Layer {
+    /// `y = W x + b`, in the order of the inputs whatever is left out or taken together.
+    fn apply(&self, x: &[f32], y: &mut [f32], rectified: bool) {
+        let n = self.outputs;
+        let y = &mut y[..n];
+        y.copy_from_slice(&self.bias);
+        let mut some = [(0.0, 0); TOGETHER];
+        let mut count = 0;
+        for (i, &value) in x.iter().enumerate() {
+            if value != 0.0 {
+                some[count] = (value, i * n);
+                count += 1;
+            }
+            if count == TOGETHER {
+                let [a, b, c, d] = some.map(|(value, at)| (value, &self.weights[at..at + n]));
+                for (o, sum) in y.iter_mut().enumerate() {
+                    *sum = *sum + a.0 * a.1[o] + b.0 * b.1[o] + c.0 * c.1[o] + d.0 * d.1[o];
+                }
+                count = 0;
+            }
+        }
+        for &(value, at) in &some[..count] {
+            for (sum, weight) in y.iter_mut().zip(&self.weights[at..at + n]) {
+                *sum += value * weight;
+            }
+        }
+        if rectified {
+            for v in y {
+                *v = v.max(0.0);
+            }
+        }
+    }
+}
+
+/// Memory of a forward pass, from [`Policy::scratch`].
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Scratch {
+    values: [Vec<f32>; 2],
+}
+
+/// A network, what it sees and the meaning of its outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Policy {
+    spec: ObservationSpec,
     layers: Vec<Layer>,
     actions: [LaneChoice; 3],
 }
 
 impl Policy {
-    /// A policy from layers of (row-major `[out, in]` weights, bias), actions in output order.
+    /// A policy that sees `spec`, from layers of (row-major `[out, in]` weights, bias), actions in
+    /// output order.
     ///
     /// # Errors
     /// [`PlannerError::Policy`] if sizes do not chain from the observation to three actions, or a
     /// weight is not finite.
     pub fn new(
+        spec: ObservationSpec,
         layers: &[(Vec<f32>, Vec<f32>)],
         actions: [LaneChoice; 3],
     ) -> Result<Self, PlannerError> {
         let bad = |why: alloc::string::String| PlannerError::Policy(why);
-        let mut inputs = observation::SIZE;
+        let mut inputs = spec.size();
         let mut chained = Vec::with_capacity(layers.len());
         for (i, (weight, bias)) in layers.iter().enumerate() {
             let outputs = bias.len();
@@ -69,7 +116,7 @@ impl Policy {
         if inputs != actions.len() || chained.is_empty() {
             return Err(bad(format!("{inputs} outputs for {} actions", actions.len())));
         }
-        Ok(Self { layers: chained, actions })
+        Ok(Self { spec, layers: chained, actions })
     }
 
     /// Reads `policy.safetensors` and `policy.json`.
@@ -81,7 +128,7 @@ impl Policy {
         let bad = |why: alloc::string::String| PlannerError::Policy(why);
         let sidecar: Sidecar =
             serde_json::from_str(sidecar).map_err(|e| bad(format!("policy.json: {e}")))?;
-        let actions = sidecar.check(safetensors)?;
+        let (spec, actions) = sidecar.check(safetensors)?;
         let tensors = safetensors::SafeTensors::deserialize(safetensors)
             .map_err(|e| bad(format!("policy.safetensors: {e}")))?;
         let mut layers = Vec::new();
@@ -94,28 +141,36 @@ impl Policy {
             let bias = floats(&tensors, &format!("layers.{i}.bias"), 1)?;
             layers.push((weight, bias));
         }
-        Self::new(&layers, actions)
+        Self::new(spec, &layers, actions)
     }
 
-    /// Values of the actions in output order.
+    /// What the policy sees.
     #[must_use]
-    pub fn values(&self, observation: &[f32; observation::SIZE]) -> [f32; 3] {
-        let mut x: Vec<f32> = observation.to_vec();
+    pub fn spec(&self) -> ObservationSpec {
+        self.spec
+    }
+
+    /// Memory for [`Self::values`] of this policy.
+    #[must_use]
+    pub fn scratch(&self) -> Scratch {
+        let widest = self.layers.iter().map(|l| l.outputs).max().unwrap_or(0);
+        Scratch { values: [vec![0.0; widest], vec![0.0; widest]] }
+    }
+
+    /// Values of the actions in output order for an observation of [`Self::spec`]; not a number if
+    /// the observation's size is another. Allocates only for a scratch of another policy.
+    #[must_use]
+    pub fn values(&self, observation: &[f32], scratch: &mut Scratch) -> [f32; 3] {
+        if observation.len() != self.spec.size() {
+            return [f32::NAN; 3];
+        }
+        let [x, y] = &mut scratch.values;
+        let last = self.layers.len() - 1;
         for (i, layer) in self.layers.iter().enumerate() {
-            let mut y = layer.bias.clone();
-            for (value, column) in x.iter().zip(layer.weights.chunks_exact(layer.outputs)) {
-                if *value != 0.0 {
-                    for (sum, weight) in y.iter_mut().zip(column) {
-                        *sum += value * weight;
-                    }
-                }
-            }
-            if i + 1 < self.layers.len() {
-                for v in &mut y {
-                    *v = v.max(0.0);
-                }
-            }
-            x = y;
+            y.resize(layer.outputs, 0.0);
+            let input: &[f32] = if i == 0 { observation } else { x };
+            layer.apply(input, y, i < last);
+            core::mem::swap(x, y);
         }
         [x[0], x[1], x[2]]
     }
@@ -124,10 +179,11 @@ impl Policy {
     #[must_use]
     pub fn choose(
         &self,
-        observation: &[f32; observation::SIZE],
+        observation: &[f32],
+        scratch: &mut Scratch,
         allowed: impl Fn(LaneChoice) -> bool,
     ) -> LaneChoice {
-        let values = self.values(observation);
+        let values = self.values(observation, scratch);
         if values.iter().any(|v| !v.is_finite()) {
             return LaneChoice::Keep;
         }
@@ -152,19 +208,20 @@ struct Sidecar {
 
 #[cfg(feature = "std")]
 impl Sidecar {
-    fn check(&self, weights: &[u8]) -> Result<[LaneChoice; 3], PlannerError> {
+    fn check(&self, weights: &[u8]) -> Result<(ObservationSpec, [LaneChoice; 3]), PlannerError> {
         use sha2::Digest;
         let bad = |why: alloc::string::String| PlannerError::Policy(why);
         if self.schema != 1 {
             return Err(bad(format!("policy.json: schema {} is not 1", self.schema)));
         }
-        let expected = format!("{:016x}", observation::spec_hash());
-        if self.observation_hash != expected {
+        let known = ObservationSpec::ALL.map(|spec| (spec, format!("{:016x}", spec.hash())));
+        let Some((spec, _)) = known.iter().find(|(_, hash)| *hash == self.observation_hash) else {
             return Err(bad(format!(
-                "trained on observation {}, this program makes {expected}",
-                self.observation_hash
+                "trained on observation {}, this program makes {}",
+                self.observation_hash,
+                known.map(|(_, hash)| hash).join(" and ")
             )));
-        }
+        };
         let digest: alloc::string::String =
             sha2::Sha256::digest(weights).iter().map(|b| format!("{b:02x}")).collect();
         if !self.weights_sha256.eq_ignore_ascii_case(&digest) {
@@ -178,7 +235,7 @@ impl Sidecar {
         if seen != [LaneChoice::Left, LaneChoice::Keep, LaneChoice::Right] {
             return Err(bad("policy.json: actions must be left, keep and right".into()));
         }
-        Ok(self.actions)
+        Ok((*spec, self.actions))
     }
 }
 

@@ -18,7 +18,6 @@
 use super::rss::{RssConfig, SafeGap};
 use super::surroundings::{EgoExtent, in_lane, reaches};
 use crate::steering::LateralPath;
-use alloc::vec::Vec;
 use driver_models::ballistic;
 use road::Road;
 use tractrix_core::{EgoState, LaneChangeRefusal, Neighbour, Scene, VehicleClass, VehicleLimits};
@@ -92,6 +91,47 @@ struct Concern {
     safe: SafeGap,
 }
 
+/// The two nearest vehicles of each role, those behind first: those beyond them cannot come closer
+/// without passing.
+#[derive(Debug, Clone, Copy, Default)]
+struct Nearest<'a> {
+    list: [Option<(Role, &'a Neighbour)>; 3 * PER_ROLE],
+    count: usize,
+}
+
+/// Vehicles of each role that count.
+const PER_ROLE: usize = 2;
+
+impl<'a> Nearest<'a> {
+    fn add(&mut self, role: Role, neighbour: &'a Neighbour) {
+        let near = |(role, n): (Role, &Neighbour)| match role {
+            Role::TargetBehind => -n.front_s_m,
+            Role::TargetAhead | Role::OwnAhead => n.rear_s_m,
+        };
+        let own = near((role, neighbour));
+        let entries = self.list[..self.count].iter().flatten().copied();
+        let (mut place, mut alike, mut last_alike) = (self.count, 0, 0);
+        for (i, entry) in entries.enumerate() {
+            if entry.0 == role {
+                (alike, last_alike) = (alike + 1, i);
+            }
+            if near(entry) > own {
+                place = place.min(i);
+            }
+        }
+        if alike == PER_ROLE {
+            if place > last_alike {
+                return;
+            }
+            self.list[last_alike..self.count].rotate_left(1);
+            self.count -= 1;
+        }
+        self.list[self.count] = Some((role, neighbour));
+        self.count += 1;
+        self.list[place..self.count].rotate_right(1);
+    }
+}
+
 impl Concern {
     /// Speed and distance travelled at a time from now, for somebody behind who yields so.
     fn at(&self, time_s: f64, yield_decel_m_s2: f64) -> (f64, f64) {
@@ -136,7 +176,7 @@ pub struct GateView<'a> {
 /// The vehicles that a change from one lane to another has to do with.
 #[derive(Debug, Clone)]
 pub struct Gate {
-    concerns: Vec<Concern>,
+    concerns: [Option<Concern>; 3 * PER_ROLE],
     extent: EgoExtent,
     reaction_s: f64,
     occupied: bool,
@@ -152,7 +192,7 @@ impl Gate {
         let extent = EgoExtent::new(ego, &limits.geometry);
         let response = rss.ego_response(limits);
         let (mut occupied, mut kept_clear) = (false, false);
-        let mut concerns = Vec::new();
+        let mut nearest = Nearest::default();
         for n in &scene.neighbours {
             let ahead = n.front_s_m > extent.front_s_m;
             let role = if in_lane(road, target, n, extent.width_m) {
@@ -168,6 +208,9 @@ impl Gate {
             } else {
                 continue;
             };
+            nearest.add(role, n);
+        }
+        let concern = |(role, n): (Role, &Neighbour)| {
             let safe = match role {
                 Role::TargetBehind => {
                     SafeGap::new(&rss.behind(n.class), rss.ego_brake_max_m_s2, grade_rad)
@@ -175,10 +218,10 @@ impl Gate {
                 _ => SafeGap::new(&response, rss.brake_max_m_s2(n.class), grade_rad),
             };
             let reaction_s = rss.behind(n.class).reaction_s;
-            concerns.push(Concern { role, neighbour: *n, reaction_s, safe });
-        }
+            Concern { role, neighbour: *n, reaction_s, safe }
+        };
         Self {
-            concerns: nearest_of_each_role(concerns),
+            concerns: nearest.list.map(|entry| entry.map(concern)),
             extent,
             reaction_s: response.reaction_s,
             occupied,
@@ -212,7 +255,8 @@ impl Gate {
             let (v, travelled) = course.at(time_s);
             let d_m = path.at(road, s_m + travelled).d_m;
             let beside = strictness.from_entry && !self.enters(road, path, s_m, travelled);
-            for c in self.concerns.iter().filter(|c| c.role == Role::OwnAhead || !beside) {
+            for c in self.concerns.iter().flatten().filter(|c| c.role == Role::OwnAhead || !beside)
+            {
                 self.check_one(c, time_s, v, travelled, d_m, strictness)?;
             }
             time_s += STEP_S;
@@ -277,22 +321,4 @@ impl Gate {
         let too_soon = closing > 0.1 && gap < closing * strictness.time_to_collision_s;
         if too_close || too_soon { Err(refusal) } else { Ok(()) }
     }
-}
-
-/// The two nearest vehicles of each role: those beyond them cannot come closer without passing.
-fn nearest_of_each_role(mut concerns: Vec<Concern>) -> Vec<Concern> {
-    concerns.sort_by(|a, b| {
-        let near = |c: &Concern| match c.role {
-            Role::TargetBehind => -c.neighbour.front_s_m,
-            Role::TargetAhead | Role::OwnAhead => c.neighbour.rear_s_m,
-        };
-        near(a).total_cmp(&near(b))
-    });
-    let mut seen = [0; 3];
-    concerns.retain(|c| {
-        let count = &mut seen[c.role as usize];
-        *count += 1;
-        *count <= 2
-    });
-    concerns
 }

@@ -92,6 +92,22 @@ impl LongitudinalConfig {
     }
 }
 
+impl LongitudinalConfig {
+    /// Acceleration that brings the truck to its reference speed, m/s².
+    #[must_use]
+    pub(crate) fn tracking_m_s2(&self, target: &SpeedTarget, speed_m_s: f64) -> f64 {
+        target.accel_m_s2 + self.gain_1_s * (target.speed_m_s - speed_m_s)
+    }
+
+    /// What is asked for where `wanted_m_s2` would be good for the reference, m/s²; and that without
+    /// traffic, m/s².
+    #[must_use]
+    pub(crate) fn asked_m_s2(&self, target: &SpeedTarget, wanted_m_s2: f64) -> (f64, f64) {
+        let cruise = wanted_m_s2.clamp(-self.decel_max_m_s2, self.accel_max_m_s2);
+        (cruise.min(target.traffic_accel_m_s2), cruise)
+    }
+}
+
 /// What the speed controller is to follow.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct SpeedTarget {
@@ -184,13 +200,12 @@ impl LongitudinalController {
         let road = road_under(load, ego, target.grade_rad);
         let resistance = load.resistance_n(ego.speed_m_s, &road);
         let coast = in_gear.coast_force_n();
-        let asked = target.accel_m_s2 + c.gain_1_s * error + self.integral_m_s2;
+        let asked = c.tracking_m_s2(target, ego.speed_m_s) + self.integral_m_s2;
         let wanted = target.brake_from.map_or(asked, |(speed_m_s, accel_m_s2)| {
             let braked = accel_m_s2 + c.gain_1_s * (speed_m_s - ego.speed_m_s);
             asked.max(braked.min((coast - resistance) / mass))
         });
-        let cruise = wanted.clamp(-c.decel_max_m_s2, c.accel_max_m_s2);
-        let asked = cruise.min(target.traffic_accel_m_s2);
+        let (asked, cruise) = c.asked_m_s2(target, wanted);
         let traffic_rules = asked < cruise;
         let accel = self.smoothed(dt_s, asked, c.jerk_m_s3 * target.haste.max(1.0));
         self.coasting = target.coast && self.may_coast(error, target, ego.accel_x_m_s2);

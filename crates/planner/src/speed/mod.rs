@@ -29,4 +29,5 @@ pub use longitudinal::LongitudinalConfig;
 pub(crate) use longitudinal::{LongitudinalController, SpeedTarget};
 pub use profile::SpeedProfile;
 pub(crate) use reference::{ReferenceSpeed, SpeedBounds};
-pub(crate) use stop_and_go::StopAndGo;
+pub(crate) use road_load::power_reserve_w;
+pub(crate) use stop_and_go::{KeptGear, StopAndGo};

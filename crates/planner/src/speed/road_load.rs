@@ -123,3 +123,14 @@ impl<'a> InGear<'a> {
 pub(super) fn effective_mass_kg(limits: &VehicleLimits, in_gear: &InGear<'_>) -> f64 {
     limits.road_load.mass_kg + in_gear.rotating_mass_kg
 }
+
+/// Largest engine power less what driving on at this speed on this grade takes at the wheels, W.
+#[must_use]
+pub(crate) fn power_reserve_w(limits: &VehicleLimits, ego: &EgoState, grade_rad: f64) -> f64 {
+    let full_load = &limits.powertrain.full_load_nm;
+    let powers_w = full_load.x().iter().zip(full_load.y()).map(|(speed, torque)| speed * torque);
+    let most_w = powers_w.fold(0.0, f64::max) - limits.powertrain.auxiliary_power_w;
+    let load = &limits.road_load;
+    let resistance_n = load.resistance_n(ego.speed_m_s, &road_under(load, ego, grade_rad));
+    most_w - resistance_n * ego.speed_m_s
+}

@@ -61,9 +61,11 @@ pub(crate) struct StopAndGo {
     standing: bool,
     /// It is a jam.
     jam: bool,
-    /// The gear engaged last, and for how long, s.
-    gear: (u8, f64),
 }
+
+/// The gear engaged last, and for how long, s.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct KeptGear(u8, f64);
 
 impl StopAndGo {
     /// Acceleration not to be exceeded, m/s²; infinite outside a jam. `steady_gap_m` is the gap
@@ -78,7 +80,7 @@ impl StopAndGo {
     ) -> f64 {
         self.jam = false;
         let Some(lead) = lead else {
-            *self = Self { gear: self.gear, ..Self::default() };
+            *self = Self::default();
             return f64::INFINITY;
         };
         let ahead_m_s = lead.speed_m_s.max(0.0);
@@ -111,10 +113,18 @@ impl StopAndGo {
         (GAIN_1_S * (rolling - speed_m_s)).clamp(ACCEL_M_S2.0, ACCEL_M_S2.1)
     }
 
+    /// Whether the last step was in a jam.
+    pub(crate) fn is_jam(&self) -> bool {
+        self.jam
+    }
+}
+
+impl KeptGear {
     /// The gear to ask for: in a jam the engaged one, as long as the engine may turn in it.
-    pub(crate) fn gear(
+    pub(crate) fn choose(
         &mut self,
         dt_s: f64,
+        jam: bool,
         ego: &EgoState,
         limits: &VehicleLimits,
         pedal_frac: f64,
@@ -124,8 +134,8 @@ impl StopAndGo {
         else {
             return GearRequest::Automatic;
         };
-        let for_s = if self.gear.0 == gear { self.gear.1 + dt_s } else { 0.0 };
-        self.gear = (gear, for_s);
+        let for_s = if self.0 == gear { self.1 + dt_s } else { 0.0 };
+        *self = Self(gear, for_s);
         let n = ego.speed_m_s * ratio * p.final_drive_ratio / p.wheel_radius_m;
         let lowest = if pedal_frac > LUGS.0 {
             LUGS.1 * p.lugging_speed_rad_s
@@ -133,7 +143,7 @@ impl StopAndGo {
             KEPT.0 * p.idle_speed_rad_s
         };
         let part = if for_s < NEW_GEAR_S { KEPT.2 } else { KEPT.1 };
-        let kept = self.jam && n > lowest && n < part * p.max_speed_rad_s;
+        let kept = jam && n > lowest && n < part * p.max_speed_rad_s;
         if kept { GearRequest::Gear(gear) } else { GearRequest::Automatic }
     }
 }

@@ -4,52 +4,52 @@
 //! |---|---|
 //! | `mod` | the stack of one truck, a tick with its guard |
 //! | `config` | what a user may set |
-//! | `driving` | the part of a tick with trustworthy inputs |
+//! | `tactics` | what to drive: lane changes, car following, reference speed |
+//! | `decide` | the decision of a tick, and what a learned decider sees |
 //! | `speed` | the predictive speed planner in the stack |
+//! | `control` | how it is driven: both controllers and the gear |
+//! | `gear` | the gear that the speed plan has |
 
 mod config;
-mod driving;
+mod control;
+mod decide;
+mod gear;
 mod speed;
+mod tactics;
 
 pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};
+pub use tactics::{TacticalPlan, Tactics};
 
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
-use crate::decider::observation::Observer;
 use crate::decider::{DeciderKind, LaneChoice, Policy};
 use crate::pcc::horizon::{HorizonFailure, HorizonPlan};
-use crate::safety::{GuardInput, GuardMemory, Headway, inspect, limit};
-use crate::speed::{
-    LeadView, LoadEstimate, LoadEstimator, LongitudinalController, ReferenceSpeed, StopAndGo, leads,
-};
-use crate::steering::{LateralController, ManeuverPlanner};
-use crate::{PlannerError, SpeedProfile};
+use crate::safety::{GuardInput, GuardMemory, inspect, limit};
+use crate::speed::{LoadEstimate, LoadEstimator};
+use crate::steering::LateralPath;
+use crate::{PlannerError, Situation, SpeedProfile};
+use control::Control;
 use road::Road;
-use speed::SpeedPlanning;
-use tractrix_core::{EgoState, Maneuver, Plan, Scene, Stamped, Time, VehicleLimits, VehicleStatus};
+use tractrix_core::{
+    Command, EgoState, Maneuver, PathPoint, Plan, Scene, Stamped, Time, VehicleLimits,
+    VehicleStatus,
+};
+
+/// Spacing of the published path, s, and its number of points.
+const PATH_STEP_S: f64 = 0.2;
+const PATH_POINTS: usize = 26;
 
 /// The planning stack of one truck.
 #[derive(Debug, Clone)]
 pub struct Stack {
-    config: StackConfig,
-    lateral: LateralController,
-    longitudinal: LongitudinalController,
-    jam: StopAndGo,
-    reference: ReferenceSpeed,
-    /// What the driver, limits and curves allow: up to there cruise control rolls before it brakes,
-    /// and so fast a planned truck would be without others.
-    ceiling: ReferenceSpeed,
+    tactics: Tactics,
+    control: Control,
     guard: GuardMemory,
-    maneuver: Option<ManeuverPlanner>,
     ticks: u64,
     last_tick: Option<Time>,
     /// Last trustworthy state, moved on by dead reckoning while there is no other.
     believed: EgoState,
-    wish: LaneChoice,
-    policy: Option<Arc<Policy>>,
-    observer: Observer,
-    profile: Option<SpeedProfile>,
-    speed: SpeedPlanning,
     estimator: LoadEstimator,
     /// The truck's limits with the estimated load, once there is a valid estimate.
     estimated: Option<VehicleLimits>,
@@ -63,9 +63,6 @@ impl Stack {
     /// [`PlannerError`] names the configuration key or the vehicle's value that cannot be used;
     /// [`PlannerError::NoPolicy`] if the decider is the learned one.
     pub fn new(config: StackConfig, limits: &VehicleLimits) -> Result<Self, PlannerError> {
-        if config.decider == DeciderKind::Dqn {
-            return Err(PlannerError::NoPolicy);
-        }
         Self::build(config, limits, None)
     }
 
@@ -86,36 +83,32 @@ impl Stack {
         limits: &VehicleLimits,
         policy: Option<Arc<Policy>>,
     ) -> Result<Self, PlannerError> {
-        config.check()?;
+        let estimator = config.estimator;
+        let tactics = Tactics::new(config, policy)?;
         limits.check()?;
-        let rates = &config.rates;
         Ok(Self {
-            lateral: LateralController::new(config.lateral, limits, rates.control_s())?,
-            longitudinal: LongitudinalController::new(config.longitudinal),
-            jam: StopAndGo::default(),
-            reference: ReferenceSpeed::default(),
-            ceiling: ReferenceSpeed::default(),
+            control: Control::new(tactics.config(), limits)?,
+            tactics,
             guard: GuardMemory::default(),
-            maneuver: None,
             ticks: 0,
             last_tick: None,
             believed: EgoState::default(),
-            wish: LaneChoice::Keep,
-            policy,
-            observer: Observer::new(rates.tick_s * f64::from(rates.path_ticks)),
-            profile: None,
-            speed: SpeedPlanning::new(&config),
-            estimator: LoadEstimator::new(config.estimator, &limits.road_load),
+            estimator: LoadEstimator::new(estimator, &limits.road_load),
             estimated: None,
             plan: Plan::default(),
-            config,
         })
     }
 
     /// The configuration.
     #[must_use]
     pub fn config(&self) -> &StackConfig {
-        &self.config
+        self.tactics.config()
+    }
+
+    /// What decides on lane and speed.
+    #[must_use]
+    pub fn tactics(&self) -> &Tactics {
+        &self.tactics
     }
 
     /// The latest plan.
@@ -133,7 +126,7 @@ impl Stack {
     /// Sets the driver's set speed, m/s, clamped to 0..40; a non-finite value is ignored.
     pub fn set_speed(&mut self, speed_m_s: f64) {
         if speed_m_s.is_finite() {
-            self.config.set_speed_m_s = speed_m_s.clamp(0.0, 40.0);
+            self.tactics.config.set_speed_m_s = speed_m_s.clamp(0.0, 40.0);
         }
     }
 
@@ -142,42 +135,42 @@ impl Stack {
     /// speed the set speed is the reference and the plan's status is
     /// [`tractrix_core::PlanStatus::Fallback`]. `None` goes back to planning while driving.
     pub fn set_speed_profile(&mut self, profile: Option<SpeedProfile>) {
-        self.profile = profile;
+        self.tactics.profile = profile;
     }
 
     /// The last plan of the predictive speed planner, made while driving.
     #[must_use]
     pub fn speed_plan(&self) -> Option<&HorizonPlan> {
-        self.speed.last()
+        self.tactics.speed.last()
     }
 
     /// Why the last attempt to plan the speed brought none; `None` if it did.
     #[must_use]
     pub fn speed_plan_failure(&self) -> Option<&HorizonFailure> {
-        self.speed.failure()
+        self.tactics.speed.failure()
     }
 
     /// Speed plans made so far while driving.
     #[must_use]
     pub fn speed_plans_made(&self) -> u64 {
-        self.speed.made()
+        self.tactics.speed.made()
     }
 
     /// Lateness against cruise control at the set speed, s; time lost behind traffic not counted.
     #[must_use]
     pub fn speed_plan_late_s(&self) -> f64 {
-        self.speed.late_s()
+        self.tactics.speed.late_s()
     }
 
     /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick.
     pub fn request_lane_change(&mut self, wish: LaneChoice) {
-        self.wish = wish;
+        self.tactics.request_lane_change(wish);
     }
 
     /// The lane change that is wished from outside and was not looked at yet.
     #[must_use]
     pub fn wish(&self) -> LaneChoice {
-        self.wish
+        self.tactics.wish
     }
 
     /// One tick: the plan for `[now, next tick)`, its command guarded. Never fails: what is wrong
@@ -216,13 +209,11 @@ impl Stack {
         road: &Road,
         limits: &VehicleLimits,
     ) -> &Plan {
-        let dt_s = self
-            .last_tick
-            .map_or(self.config.rates.tick_s, |t| now.seconds_since(t))
-            .clamp(0.0, 0.5);
+        let tick_s = self.config().rates.tick_s;
+        let dt_s = self.last_tick.map_or(tick_s, |t| now.seconds_since(t)).clamp(0.0, 0.5);
         self.last_tick = Some(now);
         let (inspection, memory) =
-            inspect(&self.config.guard, &self.guard, now, ego, status, scene.map(|s| s.time));
+            inspect(&self.config().guard, &self.guard, now, ego, status, scene.map(|s| s.time));
         self.guard = memory;
         match ego {
             Some(ego) if inspection.ego_usable => self.believed = ego.value,
@@ -237,16 +228,17 @@ impl Stack {
             self.estimate_load(dt_s, &ego, road, limits);
             let estimated = self.estimated.take();
             let known = estimated.as_ref().unwrap_or(limits);
-            let planned = self.drive(now, &ego, scene, road, known);
+            let planned = self.drive(&Situation { now, ego: &ego, scene, road, limits: known });
             self.estimated = estimated;
             planned
         } else {
-            self.maneuver = None;
+            self.tactics.release();
             None
         };
         let curvature = road.line().at(ego.s_m).curvature_1_m;
+        let lateral = &self.control.lateral;
         let steady =
-            self.lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);
+            lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);
         let input = GuardInput {
             dt_s,
             speed_m_s: ego.speed_m_s,
@@ -254,9 +246,9 @@ impl Stack {
             keep_lane_wheel_rad: steady * limits.lateral.steering_ratio,
             minimal_risk: inspection.minimal_risk,
             driver_wheel_rad: inspection.driver.then_some(ego.steering_wheel_rad),
-            headway: self.headway(&ego, scene, road, limits),
+            headway: self.tactics.headway(&Situation { now, ego: &ego, scene, road, limits }),
         };
-        let (guarded, memory) = limit(&self.config.guard, &self.guard, &input, limits);
+        let (guarded, memory) = limit(&self.config().guard, &self.guard, &input, limits);
         self.guard = memory;
         self.plan.guard.clear();
         self.plan.guard.extend(inspection.reasons.union(guarded.reasons).iter());
@@ -264,7 +256,8 @@ impl Stack {
         if guarded.minimal_risk || inspection.driver {
             self.plan.maneuver =
                 if inspection.driver { Maneuver::KeepLane } else { Maneuver::MinimalRisk };
-            self.lateral
+            self.control
+                .lateral
                 .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);
         }
         self.ticks = self.ticks.wrapping_add(1);
@@ -273,11 +266,11 @@ impl Stack {
 
     /// Listens to the force balance; once a second takes over a valid estimate that differs.
     fn estimate_load(&mut self, dt_s: f64, ego: &EgoState, road: &Road, limits: &VehicleLimits) {
-        if !self.config.estimator.enabled {
+        if !self.config().estimator.enabled {
             return;
         }
         self.estimator.update(dt_s, ego, grade(road, ego, limits), limits);
-        if !self.ticks.is_multiple_of(u64::from(self.config.rates.decision_ticks)) {
+        if !self.ticks.is_multiple_of(u64::from(self.config().rates.decision_ticks)) {
             return;
         }
         let retarder_n = &limits.powertrain.retarder_force_n;
@@ -296,21 +289,39 @@ impl Stack {
         }
     }
 
-    /// The vehicle in the path with the least time to spare, for the guard.
-    fn headway(
-        &self,
-        ego: &EgoState,
-        scene: &Scene,
-        road: &Road,
-        limits: &VehicleLimits,
-    ) -> Option<Headway> {
-        let view = LeadView { ego, scene, road, limits, rss: &self.config.rss };
-        leads(&view, self.maneuver.as_ref()?)
-            .into_iter()
-            .flatten()
-            .filter(|lead| lead.in_path)
-            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
-            .map(|l| Headway { gap_m: l.gap_m, speed_m_s: l.speed_m_s, accel_m_s2: l.accel_m_s2 })
+    /// Plans and controls with trustworthy inputs; `None` if there is no lane to drive in.
+    fn drive(&mut self, at: &Situation<'_>) -> Option<Command> {
+        let tactical = self.tactics.tick(at)?;
+        let plan = &mut self.plan;
+        plan.maneuver = tactical.maneuver;
+        plan.refusal = tactical.refusal;
+        plan.reason = tactical.reason;
+        plan.lane = tactical.lane;
+        plan.following = tactical.following;
+        plan.reference_speed_m_s = tactical.reference_speed_m_s;
+        plan.speed_status = self.tactics.speed_status;
+        if tactical.new_speed {
+            plan.speed.clear();
+            plan.speed.extend_from_slice(self.tactics.speed_points());
+        }
+        if tactical.new_path {
+            publish_path(&mut plan.path, &tactical.path, at.road, at.ego);
+        }
+        let control_ticks = u64::from(self.tactics.config().rates.control_ticks);
+        if !self.ticks.is_multiple_of(control_ticks) {
+            return Some(*self.guard.sent());
+        }
+        let driven = self.control.step(&self.tactics, &tactical, at, self.guard.sent());
+        if driven.traffic_rules {
+            self.tactics.held_up();
+        }
+        let plan = &mut self.plan;
+        plan.held_up = driven.traffic_rules || tactical.held_back;
+        plan.target_speed_m_s = tactical.target.speed_m_s;
+        plan.target_accel_m_s2 = driven.accel_m_s2;
+        plan.target_d_m = at.ego.d_m - driven.offset_m;
+        plan.lateral_error_m = driven.offset_m;
+        Some(driven.command)
     }
 
     /// Moves the believed state along the road with the deceleration that was commanded.
@@ -331,4 +342,13 @@ fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
     let front = road.at(ego.s_m + g.front_m, 0.0).z_m;
     let rear = road.at(ego.s_m - g.rear_m(), 0.0).z_m;
     libm::atan((front - rear) / length)
+}
+
+fn publish_path(out: &mut Vec<PathPoint>, path: &LateralPath, road: &Road, ego: &EgoState) {
+    let step_m = ego.speed_m_s.max(1.0) * PATH_STEP_S;
+    out.clear();
+    out.extend(
+        (0..PATH_POINTS)
+            .map(|i| path.point(road, ego.s_m + i as f64 * step_m, i as f64 * PATH_STEP_S)),
+    );
 }

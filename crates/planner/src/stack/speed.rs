@@ -10,9 +10,9 @@ use crate::StackConfig;
 use crate::pcc::horizon::{
     HorizonFailure, HorizonPlan, HorizonPlanner, HorizonPoint, HorizonRequest, LeadAhead,
 };
-use crate::pcc::model::{Drive, Tuning};
+use crate::pcc::model::Tuning;
 use road::{LaneEnd, ProfilePoint, Road};
-use tractrix_core::{EgoState, GearRequest, PlanStatus, Time, VehicleLimits};
+use tractrix_core::{EgoState, PlanStatus, Time, VehicleLimits};
 
 /// Largest planned brake force per mass, m/s²: holds the truck on -9 %.
 const BRAKE_M_S2: f64 = 1.0;
@@ -20,18 +20,6 @@ const BRAKE_M_S2: f64 = 1.0;
 const STEP_M: f64 = 12.5;
 /// A truck this far off the plan's speed makes a new plan, m/s.
 const REPLAN_OFF_M_S: f64 = 0.7;
-/// A truck this far off the plan's speed chooses its gears itself, m/s; and again asks for gears
-/// from half of it on.
-const GEAR_OFF_M_S: f64 = 1.5;
-/// An open driveline is closed when the truck is this much faster than planned, m/s: it must not
-/// run away.
-const RUNAWAY_M_S: f64 = 0.5;
-/// A requested gear is kept for this long, s.
-const GEAR_HOLD_S: f64 = 4.0;
-
-/// Above this pedal a gear below the lugging limit is not asked for.
-const LUGGING_PEDAL_FRAC: f64 = 0.75;
-
 /// What the road ahead, the truck and traffic are when a plan is asked for.
 pub(super) struct Ahead<'a> {
     pub(super) now: Time,
@@ -40,14 +28,6 @@ pub(super) struct Ahead<'a> {
     pub(super) lane: u16,
     pub(super) limits: &'a VehicleLimits,
     pub(super) lead: Option<LeadAhead>,
-}
-
-/// What the truck does now, for the choice of a gear.
-pub(super) struct Doing {
-    pub(super) reference_m_s: f64,
-    pub(super) free: bool,
-    pub(super) braking: bool,
-    pub(super) pedal_frac: f64,
 }
 
 /// Plans and their use.
@@ -61,9 +41,6 @@ pub(super) struct SpeedPlanning {
     lead: Option<u64>,
     lane: u16,
     held_up: bool,
-    asking: bool,
-    gear: GearRequest,
-    gear_s: f64,
 }
 
 impl SpeedPlanning {
@@ -82,9 +59,6 @@ impl SpeedPlanning {
             lead: None,
             lane: 0,
             held_up: false,
-            asking: false,
-            gear: GearRequest::Automatic,
-            gear_s: 0.0,
         }
     }
 
@@ -196,62 +170,8 @@ impl SpeedPlanning {
         }
     }
 
-    /// Whether the plan wants neither fuel nor brake here.
-    pub(super) fn coasts(&self, s_m: f64, doing: &Doing) -> bool {
-        doing.free
-            && self
-                .at(s_m)
-                .is_some_and(|p| p.coast && (p.speed_m_s - doing.reference_m_s).abs() < 0.1)
+    /// Whether the plan wants neither fuel nor brake here, and sets the reference.
+    pub(super) fn coasts(&self, s_m: f64, free: bool, reference_m_s: f64) -> bool {
+        free && self.at(s_m).is_some_and(|p| p.coast && (p.speed_m_s - reference_m_s).abs() < 0.1)
     }
-
-    /// The gear to ask for: the plan's as long as the truck follows it.
-    pub(super) fn gear(
-        &mut self,
-        dt_s: f64,
-        config: &StackConfig,
-        ego: &EgoState,
-        limits: &VehicleLimits,
-        doing: &Doing,
-    ) -> GearRequest {
-        self.gear_s += dt_s;
-        let lead_m = 0.5 * limits.powertrain.shift_duration_s.clamp(0.0, 3.0) * ego.speed_m_s;
-        let wanted = match (self.at(ego.s_m), self.at(ego.s_m + lead_m)) {
-            (Some(here), Some(soon)) if config.speed_plan.request_gears && !doing.braking => {
-                let over = ego.speed_m_s - here.speed_m_s;
-                let room = if self.asking { GEAR_OFF_M_S } else { 0.5 * GEAR_OFF_M_S };
-                self.asking = doing.free && over.abs() < room;
-                match soon.drive {
-                    _ if !self.asking => GearRequest::Automatic,
-                    Drive::Gear(g)
-                        if doing.pedal_frac > LUGGING_PEDAL_FRAC && lugs(g, ego, limits) =>
-                    {
-                        GearRequest::Automatic
-                    }
-                    Drive::Gear(g) => GearRequest::Gear(g + 1),
-                    Drive::Neutral if over < RUNAWAY_M_S && soon.coast => GearRequest::Neutral,
-                    Drive::Neutral => GearRequest::Automatic,
-                }
-            }
-            _ => {
-                self.asking = false;
-                GearRequest::Automatic
-            }
-        };
-        // A planned gear rests for a while; giving the choice back to the gearbox never waits.
-        let rests = wanted != GearRequest::Automatic
-            && self.gear != GearRequest::Automatic
-            && self.gear_s < GEAR_HOLD_S;
-        if wanted != self.gear && !rests {
-            self.gear = wanted;
-            self.gear_s = 0.0;
-        }
-        self.gear
-    }
-}
-
-/// Whether a gear, as an index, turns the engine below its lugging limit.
-fn lugs(gear: u8, ego: &EgoState, limits: &VehicleLimits) -> bool {
-    let p = &limits.powertrain;
-    let ratio = p.gear_ratios.get(usize::from(gear)).copied().unwrap_or(0.0);
-    ego.speed_m_s * ratio * p.final_drive_ratio / p.wheel_radius_m < p.lugging_speed_rad_s
 }

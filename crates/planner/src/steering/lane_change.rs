@@ -10,7 +10,6 @@ use super::path::{Lateral, LateralPath, direction, lane_centre};
 use crate::error::config_in;
 use crate::safety::{Gate, SpeedCourse, Strictness};
 use crate::{LaneChoice, PlannerError};
-use alloc::vec::Vec;
 use road::{LaneKind, Road};
 use serde::{Deserialize, Serialize};
 use tractrix_core::{EgoState, GRAVITY_M_S2, LaneChangeRefusal, VehicleLimits};
@@ -198,15 +197,16 @@ pub fn plan_change(
     if gate.occupied(&strictness) {
         return Err(LaneChangeRefusal::Occupied);
     }
-    let courses = match start.lane_ends_in_m {
-        _ if v >= config.speed_min_m_s => courses(config, v, start.reference_speed_m_s),
-        Some(_) => PULL_AWAY_M.map(|length_m| pulling_away(v, length_m)).into(),
-        None => Vec::new(),
-    };
+    let mut courses = Courses::default();
+    if v >= config.speed_min_m_s {
+        courses.sample(config, v, start.reference_speed_m_s);
+    } else if start.lane_ends_in_m.is_some() {
+        PULL_AWAY_M.into_iter().for_each(|length_m| courses.add(0.0, pulling_away(v, length_m)));
+    }
     let room_m = start.lane_ends_in_m.unwrap_or(f64::INFINITY);
     let mut refusal = None;
     let corridor = Corridor::new(start.road, start.path.lane, target);
-    for course in courses {
+    for course in courses.cheapest_first() {
         let length_m = course.at(course.duration_s).1;
         if length_m > room_m {
             continue;
@@ -246,27 +246,60 @@ pub(super) fn plan_abort(config: &LaneChangeConfig, start: &Start<'_>, own: u16)
     }
 }
 
-/// The sampled courses, cheapest first: short, at the reference speed, without speed change.
-fn courses(config: &LaneChangeConfig, v: f64, reference_m_s: f64) -> Vec<SpeedCourse> {
-    let mut list = Vec::with_capacity(45);
-    let steps = libm::floor((config.duration_max_s - config.duration_min_s) / 0.5) as usize;
-    for i in 0..=steps.min(40) {
-        let duration_s = config.duration_min_s + 0.5 * i as f64;
-        for change_m_s in [0.0, 1.0, 2.0, -1.0, -2.0] {
-            let end = v + change_m_s;
-            let accel = change_m_s / duration_s;
-            let allowed = accel <= config.accel_max_m_s2 && accel >= -config.decel_max_m_s2;
-            if allowed && end >= config.speed_min_m_s && (end <= reference_m_s || change_m_s <= 0.0)
-            {
-                let cost = 0.2 * (duration_s - 7.0) * (duration_s - 7.0)
-                    + 0.1 * (reference_m_s - end).abs()
-                    + 0.3 * change_m_s * change_m_s;
-                list.push((cost, SpeedCourse { start_m_s: v, end_m_s: end, duration_s }));
+/// Changes of speed that are sampled, m/s.
+const CHANGES_M_S: [f64; 5] = [0.0, 1.0, 2.0, -1.0, -2.0];
+/// Steps of the duration that are sampled, s, and how many at most.
+const DURATION_STEP_S: f64 = 0.5;
+const DURATIONS: usize = 41;
+
+/// Sampled courses with their costs, on the stack.
+struct Courses {
+    list: [(f64, usize, SpeedCourse); DURATIONS * CHANGES_M_S.len()],
+    count: usize,
+}
+
+impl Default for Courses {
+    fn default() -> Self {
+        let nothing = (0.0, 0, SpeedCourse::default());
+        Self { list: [nothing; DURATIONS * CHANGES_M_S.len()], count: 0 }
+    }
+}
+
+impl Courses {
+    fn add(&mut self, cost: f64, course: SpeedCourse) {
+        if let Some(place) = self.list.get_mut(self.count) {
+            *place = (cost, self.count, course);
+            self.count += 1;
+        }
+    }
+
+    /// Adds what a truck at `v` may drive: short, at the reference speed, without speed change.
+    fn sample(&mut self, config: &LaneChangeConfig, v: f64, reference_m_s: f64) {
+        let range_s = config.duration_max_s - config.duration_min_s;
+        let steps = libm::floor(range_s / DURATION_STEP_S) as usize;
+        for i in 0..=steps.min(DURATIONS - 1) {
+            let duration_s = config.duration_min_s + DURATION_STEP_S * i as f64;
+            for change_m_s in CHANGES_M_S {
+                let end = v + change_m_s;
+                let accel = change_m_s / duration_s;
+                let allowed = accel <= config.accel_max_m_s2 && accel >= -config.decel_max_m_s2;
+                let wished = end <= reference_m_s || change_m_s <= 0.0;
+                if allowed && wished && end >= config.speed_min_m_s {
+                    let cost = 0.2 * (duration_s - 7.0) * (duration_s - 7.0)
+                        + 0.1 * (reference_m_s - end).abs()
+                        + 0.3 * change_m_s * change_m_s;
+                    self.add(cost, SpeedCourse { start_m_s: v, end_m_s: end, duration_s });
+                }
             }
         }
     }
-    list.sort_by(|a, b| a.0.total_cmp(&b.0));
-    list.into_iter().map(|(_, course)| course).collect()
+
+    /// The courses, cheapest first; of equally dear ones the one that was added first.
+    fn cheapest_first(&mut self) -> impl Iterator<Item = SpeedCourse> + '_ {
+        let list = &mut self.list[..self.count];
+        list.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        list.iter().map(|(_, _, course)| *course)
+    }
 }
 
 /// Course of a truck that stands or crawls at its lane's end: it pulls away as it moves over.

@@ -7,11 +7,10 @@ use super::lane_change::{
     target_lane,
 };
 use super::path::{LateralPath, lane_centre};
-use crate::LaneChoice;
 use crate::decider::lane_ends_in_m;
 use crate::safety::{Gate, GateView, RssConfig, SpeedCourse};
-use road::Road;
-use tractrix_core::{EgoState, LaneChangeRefusal, Maneuver, Scene, Time, VehicleLimits};
+use crate::{LaneChoice, Situation};
+use tractrix_core::{LaneChangeRefusal, Maneuver, Time};
 
 /// Deceleration of a truck that stops again on its way out of a lane that ends, m/s².
 const WAITS_DECEL_M_S2: f64 = 0.8;
@@ -35,17 +34,9 @@ enum Phase {
 
 /// What the state machine looks at.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Situation<'a> {
-    /// Time.
-    pub now: Time,
-    /// The truck.
-    pub ego: &'a EgoState,
-    /// The others.
-    pub scene: &'a Scene,
-    /// The road.
-    pub road: &'a Road,
-    /// The truck's limits.
-    pub limits: &'a VehicleLimits,
+pub(crate) struct Outlook<'a> {
+    /// The truck and what is around it.
+    pub at: &'a Situation<'a>,
     /// Reference speed, m/s.
     pub reference_speed_m_s: f64,
     /// Steepest descent ahead, rad (uphill positive).
@@ -109,6 +100,13 @@ impl ManeuverPlanner {
         Some((course.at(time_s).0, accel))
     }
 
+    /// The part of a change or of its way back that is driven, 0 to 1.
+    #[must_use]
+    pub(crate) fn progress_frac(&self, s_m: f64) -> f64 {
+        let Some(q) = self.path.offset.filter(|_| self.phase != Phase::Keep) else { return 0.0 };
+        (1.0 - (q.end_s_m() - s_m) / q.length_m()).clamp(0.0, 1.0)
+    }
+
     /// Looks at a wish; starts the change if it can be driven safely.
     ///
     /// # Errors
@@ -116,27 +114,50 @@ impl ManeuverPlanner {
     pub(crate) fn request(
         &mut self,
         choice: LaneChoice,
-        at: &Situation<'_>,
+        out: &Outlook<'_>,
     ) -> Result<(), LaneChangeRefusal> {
-        if choice == LaneChoice::Keep {
-            return Ok(());
+        if let Some(PlannedChange { path, course }) = self.plan(choice, out)? {
+            let own = self.path.lane;
+            self.path = path;
+            self.phase = Phase::Change { own, choice, course, began: out.at.now, waits: false };
         }
-        if self.phase != Phase::Keep || at.now < self.quiet_until {
-            return Err(LaneChangeRefusal::Busy);
-        }
-        let own = self.path.lane;
-        let (s_m, v) = (at.ego.s_m, at.ego.speed_m_s);
-        let target = target_lane(at.road, own, choice, s_m, v, &self.config)?;
-        let gate = self.gate(at, own, target);
-        let PlannedChange { path, course } =
-            plan_change(&self.config, &self.start(at), target, &gate)?;
-        self.path = path;
-        self.phase = Phase::Change { own, choice, course, began: at.now, waits: false };
         Ok(())
     }
 
+    /// Whether [`Self::request`] would start the change here.
+    ///
+    /// # Errors
+    /// Why it would not be driven.
+    pub(crate) fn would_pass(
+        &self,
+        choice: LaneChoice,
+        out: &Outlook<'_>,
+    ) -> Result<(), LaneChangeRefusal> {
+        self.plan(choice, out).map(|_| ())
+    }
+
+    /// The change that a wish would start; none for a wish to keep the lane.
+    fn plan(
+        &self,
+        choice: LaneChoice,
+        out: &Outlook<'_>,
+    ) -> Result<Option<PlannedChange>, LaneChangeRefusal> {
+        if choice == LaneChoice::Keep {
+            return Ok(None);
+        }
+        if self.phase != Phase::Keep || out.at.now < self.quiet_until {
+            return Err(LaneChangeRefusal::Busy);
+        }
+        let own = self.path.lane;
+        let (s_m, v) = (out.at.ego.s_m, out.at.ego.speed_m_s);
+        let target = target_lane(out.at.road, own, choice, s_m, v, &self.config)?;
+        let gate = self.gate(out, own, target);
+        plan_change(&self.config, &self.start(out), target, &gate).map(Some)
+    }
+
     /// Checks a change under way and ends what is complete. Returns the reason of an abort.
-    pub(crate) fn update(&mut self, at: &Situation<'_>) -> Option<LaneChangeRefusal> {
+    pub(crate) fn update(&mut self, out: &Outlook<'_>) -> Option<LaneChangeRefusal> {
+        let at = out.at;
         let done = self.path.offset.is_none_or(|q| at.ego.s_m >= q.end_s_m());
         if done {
             if self.phase != Phase::Keep {
@@ -169,7 +190,7 @@ impl ManeuverPlanner {
             let duration_s = (course.duration_s - time_s).max(0.5);
             SpeedCourse { start_m_s: v, end_m_s: course.end_m_s, duration_s }
         };
-        let gate = self.gate(at, own, target);
+        let gate = self.gate(out, own, target);
         let lane_ends = lane_ends_in_m(at.road, own, at.ego.s_m).is_some();
         let strictness = self.config.under_way(lane_ends, course.start_m_s);
         let verdict = gate.check(&rest, &self.path, at.road, s_m, &strictness);
@@ -182,7 +203,7 @@ impl ManeuverPlanner {
             return verdict.err();
         }
         let reason = verdict.err()?;
-        self.path = plan_abort(&self.config, &self.start(at), own);
+        self.path = plan_abort(&self.config, &self.start(out), own);
         self.phase = Phase::Abort { target };
         Some(reason)
     }
@@ -203,16 +224,18 @@ impl ManeuverPlanner {
         off(s_m) < room && off(s_m + soon_m) < room
     }
 
-    fn gate(&self, at: &Situation<'_>, own: u16, target: u16) -> Gate {
-        let Situation { ego, scene, road, limits, grade_rad, .. } = *at;
-        Gate::new(&GateView { rss: &self.rss, ego, scene, road, limits, grade_rad }, own, target)
+    fn gate(&self, out: &Outlook<'_>, own: u16, target: u16) -> Gate {
+        let Situation { ego, scene, road, limits, .. } = *out.at;
+        let (rss, grade_rad) = (&self.rss, out.grade_rad);
+        Gate::new(&GateView { rss, ego, scene, road, limits, grade_rad }, own, target)
     }
 
-    fn start<'a>(&'a self, at: &Situation<'a>) -> Start<'a> {
+    fn start<'a>(&'a self, out: &Outlook<'a>) -> Start<'a> {
+        let at = out.at;
         Start {
             ego: at.ego,
             path: &self.path,
-            reference_speed_m_s: at.reference_speed_m_s,
+            reference_speed_m_s: out.reference_speed_m_s,
             lane_ends_in_m: lane_ends_in_m(at.road, self.path.lane, at.ego.s_m),
             road: at.road,
             limits: at.limits,

@@ -1,22 +1,4 @@
-//! What a learned decider sees: the paper's 216 numbers. One module for training and for the truck;
-//! weights carry the hash of [`SPEC`] and are refused if it differs.
-//!
-//! A frame has 9 rows of 6 columns. Row 0 is the ego, rows 1-2 the two nearest vehicles behind (to
-//! 50 m), rows 3-8 the six nearest ahead (to 100 m), nearest first; absent rows are zero but for the
-//! last column. Columns, each clipped to -1..1:
-//!
-//! | column | ego | neighbour | divided by |
-//! |---|---|---|---|
-//! | 0 presence | 1 | 1 | 1 |
-//! | 1 along the road | 1 | its centre minus the ego's reference point, m | 100 |
-//! | 2 to the right | lateral distance from the leftmost through lane's centre, m | lateral distance from the ego, m | 8 |
-//! | 3 speed | own, m/s | ego minus neighbour, m/s | 40 |
-//! | 4 lateral speed to the right | own, m/s | neighbour minus ego, m/s | 40 |
-//! | 5 reference speed | in row `i` the one at `s + v i 3/8 s` for all rows, m/s | | 40 |
-//!
-//! Four frames of the present and of 1, 2 and 3 s ago, newest first; frames before the start are
-//! zero. The released code fills column 5 with one value; here it is the profile of the next three
-//! seconds that the paper describes.
+//! The paper's frame: the nearest vehicles around the truck, and the stack of four frames.
 
 use alloc::collections::VecDeque;
 use road::{LaneKind, Road};
@@ -30,32 +12,14 @@ pub const COLUMNS: usize = 6;
 pub const FRAME: usize = ROWS * COLUMNS;
 /// Frames in an observation.
 pub const FRAMES: usize = 4;
-/// Numbers in an observation.
+/// Numbers in the stack of frames.
 pub const SIZE: usize = FRAME * FRAMES;
-
-/// The layout in one line; changing the layout means changing this line.
-pub const SPEC: &str = "tractrix-observation-1: 4 frames (0,1,2,3 s ago) x 9 rows (ego, 2 behind <= 50 m, \
-6 ahead <= 100 m, nearest first) x 6 columns (presence, dx/100 m, right/8 m, v/40 m/s, \
-v_right/40 m/s, v_ref(s + v i 3/8 s)/40 m/s), clipped to -1..1";
 
 const AHEAD_M: f64 = 100.0;
 const BEHIND_M: f64 = 50.0;
 const AHEAD_ROWS: usize = 6;
 const BEHIND_ROWS: usize = 2;
 const PROFILE_S: f64 = 3.0;
-
-/// Hash of the layout: FNV-1a, 64 bit, of [`SPEC`]. It guards against mistakes, not against attack.
-#[must_use]
-pub const fn spec_hash() -> u64 {
-    let bytes = SPEC.as_bytes();
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    let mut i = 0;
-    while i < bytes.len() {
-        hash = (hash ^ bytes[i] as u64).wrapping_mul(0x0100_0000_01b3);
-        i += 1;
-    }
-    hash
-}
 
 /// One frame.
 pub type Frame = [f32; FRAME];
@@ -116,13 +80,13 @@ fn write_row(out: &mut Frame, row: usize, [presence, along, right, speed, drift]
     out[row * COLUMNS..row * COLUMNS + 5].copy_from_slice(&values);
 }
 
-fn scaled(value: f64, by: f64) -> f32 {
+pub(super) fn scaled(value: f64, by: f64) -> f32 {
     (value / by).clamp(-1.0, 1.0) as f32
 }
 
 /// Whether a frame shows any neighbour.
 #[must_use]
-pub fn sees_anyone(frame: &Frame) -> bool {
+pub(crate) fn sees_anyone(frame: &Frame) -> bool {
     (1..ROWS).any(|row| frame[row * COLUMNS] > 0.0)
 }
 
@@ -158,16 +122,14 @@ impl Observer {
         self.frames.front()
     }
 
-    /// The observation, newest frame first.
-    #[must_use]
-    pub fn observation(&self) -> [f32; SIZE] {
-        let mut out = [0.0; SIZE];
+    /// Writes the stack of frames, newest first; `out` has [`SIZE`] numbers.
+    pub(super) fn write(&self, out: &mut [f32]) {
         for (i, part) in out.chunks_exact_mut(FRAME).enumerate() {
-            if let Some(frame) = self.frames.get(i * self.per_second) {
-                part.copy_from_slice(frame);
+            match self.frames.get(i * self.per_second) {
+                Some(frame) => part.copy_from_slice(frame),
+                None => part.fill(0.0),
             }
         }
-        out
     }
 }
 
@@ -215,8 +177,13 @@ mod tests {
         for i in 0..40 {
             o.push([i as f32 / 40.0; FRAME]);
         }
-        let x = o.observation();
+        let mut x = [f32::NAN; SIZE];
+        o.write(&mut x);
         let at = |frame: usize| (x[frame * FRAME] * 40.0).round() as i32;
         assert_eq!([at(0), at(1), at(2), at(3)], [39, 29, 19, 9]);
+        o.clear();
+        o.push([0.5; FRAME]);
+        o.write(&mut x);
+        assert!(x[..FRAME].iter().all(|v| *v == 0.5) && x[FRAME..].iter().all(|v| *v == 0.0));
     }
 }

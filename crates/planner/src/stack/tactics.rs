@@ -1,0 +1,429 @@
+//! What to drive: lane and speed, from the situation alone. How it is driven, and the last check,
+//! are the stack's; a point that follows [`TacticalPlan`] needs neither.
+
+use alloc::sync::Arc;
+
+use super::speed::{Ahead, SpeedPlanning};
+use super::{SpeedPlannerKind, StackConfig, grade};
+use crate::decider::observation::Observer;
+use crate::decider::{DeciderKind, LaneChoice, Policy, Scratch, lane_ends_in_m};
+use crate::pcc::horizon::{HorizonPoint, LeadAhead};
+use crate::safety::{Headway, RearResponse};
+use crate::speed::{
+    Following, Lead, LeadView, ReferenceSpeed, SpeedBounds, SpeedTarget, StopAndGo, follow, leads,
+    steady_gap_m,
+};
+use crate::steering::{Lateral, LateralPath, ManeuverPlanner, Outlook};
+use crate::{PlannerError, Situation, SpeedProfile, wrapped};
+use road::{LaneKind, Road};
+use tractrix_core::{
+    EgoState, LaneChangeReason, LaneChangeRefusal, Maneuver, PlanStatus, SpeedPoint,
+};
+
+/// Time for joining a lane's centre from beside it, s.
+const JOIN_S: f64 = 6.0;
+
+/// What is to be driven until the next tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TacticalPlan {
+    /// The path.
+    pub path: LateralPath,
+    /// Acceleration that the reference speed and traffic ask for, m/s², before jerk limits.
+    pub target_accel_m_s2: f64,
+    /// The manoeuvre.
+    pub maneuver: Maneuver,
+    /// Why a change was refused or aborted in this tick.
+    pub refusal: Option<LaneChangeRefusal>,
+    /// Why the change is wished that is driven, or that was refused in this tick.
+    pub reason: Option<LaneChangeReason>,
+    /// Lane track that the truck is in, or leaves.
+    pub lane: u16,
+    /// Reference speed at the truck, m/s, before traffic.
+    pub reference_speed_m_s: f64,
+    /// Identifier of the vehicle that is followed.
+    pub following: Option<u64>,
+    /// What the speed controller is to follow.
+    pub(super) target: SpeedTarget,
+    /// No change under way sets the speed.
+    pub(super) free: bool,
+    /// Traffic is a jam.
+    pub(super) jam: bool,
+    /// The plan is made for staying behind a vehicle, or the lane must be left.
+    pub(super) held_back: bool,
+    /// The reference ahead is new.
+    pub(super) new_speed: bool,
+    /// The path has been looked at.
+    pub(super) new_path: bool,
+}
+
+/// Decider, lane changes, car following and reference speed of one truck.
+#[derive(Debug, Clone)]
+pub struct Tactics {
+    pub(super) config: StackConfig,
+    pub(super) maneuver: Option<ManeuverPlanner>,
+    pub(super) reference: ReferenceSpeed,
+    /// What the driver, limits and curves allow: up to there cruise control rolls before it brakes,
+    /// and so fast a planned truck would be without others.
+    pub(super) ceiling: ReferenceSpeed,
+    pub(super) profile: Option<SpeedProfile>,
+    pub(super) speed: SpeedPlanning,
+    pub(super) speed_status: PlanStatus,
+    pub(super) wish: LaneChoice,
+    pub(super) reason: Option<LaneChangeReason>,
+    pub(super) policy: Option<Arc<Policy>>,
+    pub(super) scratch: Scratch,
+    pub(super) observer: Observer,
+    jam: StopAndGo,
+    ticks: u64,
+    /// The tick for which the reference speed was renewed last.
+    foreseen: Option<u64>,
+    /// The speed part of the last plan; the controllers may run less often than the loop.
+    last: Option<TacticalPlan>,
+}
+
+impl Tactics {
+    /// Tactics with a configuration; `policy` is the learned decider's.
+    ///
+    /// # Errors
+    /// [`PlannerError`] names the configuration key; [`PlannerError::NoPolicy`] if the decider is
+    /// the learned one and there is none.
+    pub fn new(config: StackConfig, policy: Option<Arc<Policy>>) -> Result<Self, PlannerError> {
+        config.check()?;
+        if config.decider == DeciderKind::Dqn && policy.is_none() {
+            return Err(PlannerError::NoPolicy);
+        }
+        let rates = &config.rates;
+        Ok(Self {
+            maneuver: None,
+            reference: ReferenceSpeed::default(),
+            ceiling: ReferenceSpeed::default(),
+            profile: None,
+            speed: SpeedPlanning::new(&config),
+            speed_status: PlanStatus::default(),
+            wish: LaneChoice::Keep,
+            reason: None,
+            scratch: policy.as_ref().map(|p| p.scratch()).unwrap_or_default(),
+            policy,
+            observer: Observer::new(rates.tick_s * f64::from(rates.path_ticks)),
+            jam: StopAndGo::default(),
+            ticks: 0,
+            foreseen: None,
+            last: None,
+            config,
+        })
+    }
+
+    /// The configuration.
+    #[must_use]
+    pub fn config(&self) -> &StackConfig {
+        &self.config
+    }
+
+    /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick
+    /// that looks at paths.
+    pub fn request_lane_change(&mut self, wish: LaneChoice) {
+        self.wish = wish;
+    }
+
+    /// Whether a change to a side would be started here: what a tick would do with the wish.
+    ///
+    /// # Errors
+    /// Why it would be refused; [`LaneChangeRefusal::Busy`] before the first tick and while the
+    /// truck is not in the tactics' hands.
+    pub fn would_pass(
+        &self,
+        choice: LaneChoice,
+        at: &Situation<'_>,
+    ) -> Result<(), LaneChangeRefusal> {
+        match (&self.maneuver, self.outlook(at)) {
+            (Some(maneuver), Some(outlook)) => maneuver.would_pass(choice, &outlook),
+            _ => Err(LaneChangeRefusal::Busy),
+        }
+    }
+
+    /// Reference speed at a station, m/s; `None` before the first tick.
+    #[must_use]
+    pub fn reference_speed_m_s(&self, s_m: f64) -> Option<f64> {
+        self.reference.at(s_m).map(|(speed_m_s, _)| speed_m_s)
+    }
+
+    /// Brings the reference speed up to here, as the next tick does before it looks at wishes: after
+    /// it [`Self::would_pass`] is what that tick does with a wish. False if there is no lane to
+    /// drive in.
+    pub fn foresee(&mut self, at: &Situation<'_>) -> bool {
+        let maneuver = match self.maneuver.take() {
+            Some(maneuver) => maneuver,
+            None => {
+                let Some(lane) = start_lane(at.road, at.ego) else { return false };
+                let path = join_from(at.road, lane, at.ego);
+                ManeuverPlanner::new(self.config.lane_change, self.config.rss, path)
+            }
+        };
+        let due = self.ticks.is_multiple_of(u64::from(self.config.rates.path_ticks));
+        let known = self.foreseen == Some(self.ticks);
+        if !known && (due || self.reference.points().is_empty()) {
+            self.plan_speed(at, &maneuver);
+            self.update_reference(at, maneuver.path().lane);
+            self.foreseen = Some(self.ticks);
+        }
+        self.maneuver = Some(maneuver);
+        true
+    }
+
+    /// One tick: what to drive; `None` if there is no lane to drive in.
+    pub fn tick(&mut self, at: &Situation<'_>) -> Option<TacticalPlan> {
+        let lane = self.foresee(at);
+        let ticks = self.ticks;
+        self.ticks = ticks.wrapping_add(1);
+        let mut maneuver = self.maneuver.take().filter(|_| lane)?;
+        let rates = self.config.rates;
+        let due = |every: u32| ticks.is_multiple_of(u64::from(every));
+        let new_path = due(rates.path_ticks);
+        let refusal = if new_path {
+            self.decide(&mut maneuver, &self.outlook(at)?, due(rates.decision_ticks))
+        } else {
+            None
+        };
+        let plan = match self.last.filter(|_| !due(rates.control_ticks)) {
+            Some(last) => TacticalPlan { path: *maneuver.path(), ..last },
+            None => self.drive(at, &maneuver)?,
+        };
+        let plan = TacticalPlan {
+            maneuver: maneuver.maneuver(),
+            refusal,
+            reason: self.reason,
+            lane: maneuver.lane(),
+            new_speed: self.foreseen == Some(ticks),
+            new_path,
+            ..plan
+        };
+        self.maneuver = Some(maneuver);
+        self.last = Some(plan);
+        Some(plan)
+    }
+
+    /// A tick without usable inputs, or with a driver at the wheel: what was being driven is
+    /// forgotten.
+    pub fn release(&mut self) {
+        self.ticks = self.ticks.wrapping_add(1);
+        self.maneuver = None;
+    }
+
+    /// Speed and leads of a tick.
+    fn drive(&mut self, at: &Situation<'_>, maneuver: &ManeuverPlanner) -> Option<TacticalPlan> {
+        let ego = at.ego;
+        let (reference_m_s, reference_accel) = self.reference.at(ego.s_m)?;
+        let grade_rad = grade(at.road, ego, at.limits);
+        let leads = leads(&self.lead_view(at), maneuver);
+        let response = self.config.rss.ego_response(at.limits);
+        let following = self.follow(&leads, &response, ego.speed_m_s, grade_rad);
+        let jam_accel_m_s2 = self.stop_and_go(&leads, &response, ego.speed_m_s);
+        let planned = maneuver.planned_speed(at.now).filter(|p| p.0 < reference_m_s);
+        let (speed_m_s, accel_m_s2) = planned.unwrap_or((reference_m_s, reference_accel));
+        let free = planned.is_none();
+        let path = *maneuver.path();
+        let target = SpeedTarget {
+            speed_m_s,
+            accel_m_s2,
+            traffic_accel_m_s2: following
+                .map_or(f64::INFINITY, |(_, f)| f.accel_m_s2)
+                .min(jam_accel_m_s2),
+            haste: following.map_or(1.0, |(_, f)| f.haste),
+            grade_rad,
+            brake_from: self.may_overspeed().then(|| self.ceiling.at(ego.s_m)).flatten(),
+            coast: self.plans_ahead() && self.speed.coasts(ego.s_m, free, speed_m_s),
+        };
+        let longitudinal = &self.config.longitudinal;
+        let wanted_m_s2 = longitudinal.tracking_m_s2(&target, ego.speed_m_s);
+        // It wishes to leave a lane that ends: who still drives in it waits for a gap.
+        let waits = lane_ends_in_m(at.road, path.lane, ego.s_m).is_some();
+        let fenced = self.plans_ahead() && self.speed.last().is_some_and(|plan| plan.fenced);
+        Some(TacticalPlan {
+            path,
+            target_accel_m_s2: longitudinal.asked_m_s2(&target, wanted_m_s2).0,
+            maneuver: maneuver.maneuver(),
+            refusal: None,
+            reason: None,
+            lane: maneuver.lane(),
+            reference_speed_m_s: reference_m_s,
+            following: following.map(|(id, _)| id),
+            target,
+            free,
+            jam: self.jam.is_jam(),
+            held_back: fenced || waits || !free,
+            new_speed: false,
+            new_path: false,
+        })
+    }
+
+    /// Whether the speed is planned while driving.
+    pub(super) fn plans_ahead(&self) -> bool {
+        self.config.speed_planner == SpeedPlannerKind::Predictive && self.profile.is_none()
+    }
+
+    /// The plan at a station, where the speed is planned while driving.
+    pub(super) fn planned(&self, s_m: f64) -> Option<HorizonPoint> {
+        self.plans_ahead().then(|| self.speed.at(s_m)).flatten()
+    }
+
+    /// Takes note that traffic, not the plan, sets the acceleration.
+    pub(super) fn held_up(&mut self) {
+        if self.plans_ahead() {
+            self.speed.held_up();
+        }
+    }
+
+    /// The reference ahead.
+    pub(super) fn speed_points(&self) -> &[SpeedPoint] {
+        self.reference.points()
+    }
+
+    /// The vehicle in the path with the least time to spare, for the guard.
+    pub(super) fn headway(&self, at: &Situation<'_>) -> Option<Headway> {
+        leads(&self.lead_view(at), self.maneuver.as_ref()?)
+            .into_iter()
+            .flatten()
+            .filter(|lead| lead.in_path)
+            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+            .map(|l| Headway { gap_m: l.gap_m, speed_m_s: l.speed_m_s, accel_m_s2: l.accel_m_s2 })
+    }
+
+    /// What a change is planned with; `None` before the first tick.
+    pub(super) fn outlook<'a>(&self, at: &'a Situation<'a>) -> Option<Outlook<'a>> {
+        let (reference_speed_m_s, _) = self.reference.at(at.ego.s_m)?;
+        let grade_rad = grade(at.road, at.ego, at.limits);
+        let grade_rad = grade_rad.min(steepest_descent(at.road, at.ego.s_m));
+        Some(Outlook { at, reference_speed_m_s, grade_rad })
+    }
+
+    /// The speed that the truck would drive without others, m/s. A plan begins at the speed that it
+    /// has, and may be made for staying behind somebody: the reference then wishes nothing.
+    pub(super) fn wish_speed_m_s(&self, s_m: f64, reference_m_s: f64) -> f64 {
+        let allowed = self.plans_ahead().then(|| self.ceiling.at(s_m)).flatten();
+        allowed.map_or(reference_m_s, |(m_s, _)| m_s.max(reference_m_s))
+    }
+
+    fn lead_view<'a>(&'a self, at: &Situation<'a>) -> LeadView<'a> {
+        let Situation { ego, scene, road, limits, .. } = *at;
+        LeadView { ego, scene, road, limits, rss: &self.config.rss }
+    }
+
+    /// Whether the truck may roll above the reference on descents.
+    fn may_overspeed(&self) -> bool {
+        self.config.speed_planner == SpeedPlannerKind::Cruise && self.config.overspeed_m_s > 0.0
+    }
+
+    /// Plans the speed of the next kilometres, if it is time to.
+    fn plan_speed(&mut self, at: &Situation<'_>, maneuver: &ManeuverPlanner) {
+        if !self.plans_ahead() {
+            return;
+        }
+        let Situation { now, ego, road, limits, .. } = *at;
+        let response = self.config.rss.ego_response(limits);
+        let lead = leads(&self.lead_view(at), maneuver)
+            .into_iter()
+            .flatten()
+            .filter(|lead| lead.in_path && !lead.being_left)
+            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+            .map(|lead| LeadAhead {
+                id: lead.id,
+                gap_m: lead.gap_m,
+                speed_m_s: lead.speed_m_s,
+                wanted_gap_m: steady_gap_m(&self.config.following, &response, &lead),
+            });
+        let lead = lead.filter(|lead| {
+            self.config.decider == DeciderKind::KeepLane || self.speed.settled(ego, lead)
+        });
+        let ahead = Ahead { now, ego, road, lane: maneuver.path().lane, limits, lead };
+        self.speed.update(self.ticks, &self.config, &ahead);
+    }
+
+    fn update_reference(&mut self, at: &Situation<'_>, lane: u16) {
+        let bounds = SpeedBounds {
+            set_speed_m_s: self.config.set_speed_m_s,
+            obey_speed_limits: self.config.obey_speed_limits,
+            curve_accel_m_s2: self.config.curve_accel_m_s2,
+        };
+        let s_m = at.ego.s_m;
+        let profile = match self.config.speed_planner {
+            SpeedPlannerKind::Predictive => self.profile.as_ref(),
+            SpeedPlannerKind::Cruise => None,
+        };
+        let ahead = self.plans_ahead().then_some(&self.speed);
+        let planned = |s_m: f64| match ahead {
+            Some(speed) => speed.at(s_m).map(|p| p.speed_m_s),
+            None => profile.and_then(|p| p.at(s_m)),
+        };
+        self.reference.update(at.road, lane, s_m, &at.limits.geometry, &bounds, planned);
+        if self.may_overspeed() || self.plans_ahead() {
+            let over_m_s = if self.may_overspeed() { self.config.overspeed_m_s } else { 0.0 };
+            self.ceiling.update_like(&self.reference, bounds.set_speed_m_s + over_m_s);
+        }
+        self.speed_status = match (self.config.speed_planner, profile) {
+            (SpeedPlannerKind::Cruise, _) => PlanStatus::Cruise,
+            (SpeedPlannerKind::Predictive, None) => self.speed.status(s_m),
+            (SpeedPlannerKind::Predictive, Some(p)) if p.at(s_m).is_some() => p.status(),
+            (SpeedPlannerKind::Predictive, _) => PlanStatus::Fallback,
+        };
+    }
+
+    /// What a jam asks for, by the nearest vehicle in the path.
+    fn stop_and_go(
+        &mut self,
+        leads: &[Option<Lead>; 2],
+        response: &RearResponse,
+        speed_m_s: f64,
+    ) -> f64 {
+        let config = &self.config.following;
+        let lead = leads
+            .iter()
+            .flatten()
+            .filter(|lead| lead.in_path && !lead.being_left)
+            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
+        let steady_gap = |speed_m_s: f64| {
+            lead.map_or(0.0, |lead| steady_gap_m(config, response, &Lead { speed_m_s, ..*lead }))
+        };
+        self.jam.step(self.config.rates.control_s(), config, speed_m_s, lead, steady_gap)
+    }
+
+    /// The strictest request of car following, and whom it follows.
+    fn follow(
+        &self,
+        leads: &[Option<Lead>; 2],
+        response: &RearResponse,
+        speed_m_s: f64,
+        grade_rad: f64,
+    ) -> Option<(u64, Following)> {
+        let config = &self.config.following;
+        leads
+            .iter()
+            .flatten()
+            .map(|lead| (lead.id, follow(config, response, speed_m_s, grade_rad, lead)))
+            .min_by(|a, b| a.1.accel_m_s2.total_cmp(&b.1.accel_m_s2))
+    }
+}
+
+/// The lane to start in: the one that the truck is in, or the nearest drivable one.
+fn start_lane(road: &Road, ego: &EgoState) -> Option<u16> {
+    road.lanes_at(ego.s_m)
+        .filter(|l| l.kind != LaneKind::Shoulder)
+        .min_by(|a, b| {
+            let off = |l: &road::LaneTrack| (l.center_d_m(ego.s_m) - ego.d_m).abs();
+            off(a).total_cmp(&off(b))
+        })
+        .map(|l| l.id)
+}
+
+/// From where the truck is to the lane's centre, within [`JOIN_S`].
+fn join_from(road: &Road, lane: u16, ego: &EgoState) -> LateralPath {
+    let heading = wrapped(ego.yaw_rad - road.line().at(ego.s_m).heading_rad);
+    let here =
+        Lateral { d_m: ego.d_m, slope: libm::tan(heading.clamp(-0.5, 0.5)), second_1_m: 0.0 };
+    let length_m = JOIN_S * ego.speed_m_s.max(5.0);
+    LateralPath::join(road, lane, here, ego.s_m, length_m)
+}
+
+/// The steepest descent within the stopping distance ahead, rad, not above zero.
+fn steepest_descent(road: &Road, s_m: f64) -> f64 {
+    (0..8).map(|i| libm::atan(road.line().at(s_m + 25.0 * f64::from(i)).slope)).fold(0.0, f64::min)
+}
