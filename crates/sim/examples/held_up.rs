@@ -133,7 +133,7 @@ fn main() {
     let log: Option<u64> = value("--log").map(|v| v.parse().unwrap());
     for name in scenarios.split(',') {
         println!(
-            "scenario      seed saved % free % held s held km  v m/s  km  changes right hits hard braked most  refusals"
+            "scenario      seed saved % free % held s held km  v m/s  km   fuel g changes right hits hard braked most  refusals"
         );
         let mut mean = [0.0; 5];
         let range = log.map_or(1..=seeds, |seed| seed..=seed);
@@ -167,13 +167,14 @@ fn main() {
             let s = world.summary();
             let g = world.ghost().unwrap();
             println!(
-                "{name:13} {seed:4} {:7.1} {:6.1} {:6.0} {:7.1} {:6.2} {:4.1} {:8} {:5.2} {:4} {:4} {:6} {:4.1}  {:?}",
+                "{name:13} {seed:4} {:7.1} {:6.1} {:6.0} {:7.1} {:6.2} {:4.1} {:6.0} {:8} {:5.2} {:4} {:4} {:6} {:4.1}  {:?}",
                 100.0 * g.saving_frac.unwrap_or(f64::NAN),
                 100.0 * g.free_saving_frac.unwrap_or(f64::NAN),
                 g.held_up_s,
                 1e-3 * g.held_up_m,
                 s.mean_speed_m_s,
                 1e-3 * s.distance_m,
+                s.fuel_g,
                 s.lane_changes,
                 s.keep_right_frac,
                 s.collisions,

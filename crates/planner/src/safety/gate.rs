@@ -3,15 +3,22 @@
 //!
 //! The ego is predicted along its planned change, the others with their present speed; a vehicle
 //! ahead is also taken to go on braking as it does now, one behind to go on accelerating, both for
-//! [`HOLD_S`]. Where the truck's lane ends those behind in the target lane must let it in (StVO
-//! section 7 (4)): they are taken to react to its indicator and then to slow comfortably; whoever
-//! does not stops the change, as long as the truck is inside its lane. A truck that pulls away there
-//! counts gaps from where it reaches into the target lane. For every instant until the change is
-//! done and the reaction time has passed:
+//! [`HOLD_S`]. From the last step before the truck's body reaches into the target lane until the
+//! change is done and the reaction time has passed, and in the own lane from now on:
 //! - target lane, ahead: `gap >= d_safe(ego, other)` and time to collision above the bound;
 //! - target lane, behind, from the trailer's rear: `gap >= d_safe(other, ego)`, same bound;
 //! - own lane, ahead: `gap >= d_safe(ego, other)` as long as the ego's body reaches into the
 //!   other's.
+//!
+//! Those behind in the target lane are counted on to ease off, by a bounded deceleration and no
+//! further than to the truck's speed, once they have seen it in their lane and reacted: so much
+//! courtesy makes the change comfortable, not safe. Safe it is because the gap at entry is the safe
+//! gap for the speed that the follower has there: whoever does not ease off, and brakes as the safe
+//! gap assumes when it is undershot, stops behind the truck. Until shortly before entry the change
+//! is checked again with what is seen then, and broken off if the gap will not serve. Where the
+//! truck's lane ends those behind must let it in (StVO section 7 (4)): they are taken to react to
+//! its indicator, and a truck that pulls away there may begin with somebody alongside, because it
+//! can stop before it enters.
 //!
 //! A lane in which an emergency vehicle comes from behind within [`KEEP_CLEAR_M`] counts as occupied.
 
@@ -68,11 +75,25 @@ pub struct Strictness {
     pub own_factor: f64,
     /// Least time to collision, s.
     pub time_to_collision_s: f64,
-    /// Deceleration with which those behind in the target lane let the truck in once they have
-    /// reacted, m/s²; zero: they go on as they do.
+    /// Deceleration with which those behind in the target lane ease off once they have reacted,
+    /// m/s²; zero: they go on as they do.
     pub yield_decel_m_s2: f64,
-    /// Gaps count from where the truck's body reaches into the target lane: before, it can stop.
-    pub from_entry: bool,
+    /// They react to the truck's indicator, not only to its body in their lane.
+    pub yield_to_indicator: bool,
+    /// Somebody alongside does not stop the change from beginning: the truck can stop.
+    pub may_stop: bool,
+}
+
+/// How somebody behind makes room.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Yielding {
+    /// When there is something to react to, s from now.
+    seen_s: f64,
+    /// It is the indicator: they have begun already, as their braking shows.
+    to_indicator: bool,
+    decel_m_s2: f64,
+    /// No slower than this, m/s.
+    down_to_m_s: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -133,26 +154,29 @@ impl<'a> Nearest<'a> {
 }
 
 impl Concern {
-    /// Speed and distance travelled at a time from now, for somebody behind who yields so.
-    fn at(&self, time_s: f64, yield_decel_m_s2: f64) -> (f64, f64) {
-        if self.role == Role::TargetBehind && yield_decel_m_s2 > 0.0 {
-            let n = &self.neighbour;
-            let present = n.accel_m_s2.max(-yield_decel_m_s2);
-            let (reacted, before_m) =
-                ballistic(n.speed_m_s.max(0.0), present, time_s.min(self.reaction_s));
-            let yielding_s = (time_s - self.reaction_s).max(0.0);
-            let (then, after_m) = ballistic(reacted, -yield_decel_m_s2, yielding_s);
-            return (then, before_m + after_m);
-        }
-        let a = match self.role {
-            Role::TargetBehind => self.neighbour.accel_m_s2.max(0.0),
-            Role::TargetAhead | Role::OwnAhead => self.neighbour.accel_m_s2.min(0.0),
+    /// Speed and distance travelled at a time from now; somebody behind eases off.
+    fn at(&self, time_s: f64, yielding: &Yielding) -> (f64, f64) {
+        let n = &self.neighbour;
+        let behind = self.role == Role::TargetBehind;
+        let braking_counts = if yielding.to_indicator { yielding.decel_m_s2 } else { 0.0 };
+        let a = if behind { n.accel_m_s2.max(-braking_counts) } else { n.accel_m_s2.min(0.0) };
+        let reacted_s = match (behind, yielding.seen_s + self.reaction_s) {
+            (false, _) => f64::INFINITY,
+            (true, reacted_s) if yielding.to_indicator => reacted_s,
+            // To a whole step, so that the instant before the first easing is looked at.
+            (true, reacted_s) => STEP_S * libm::ceil(reacted_s / STEP_S),
         };
-        let v = self.neighbour.speed_m_s.max(0.0);
-        let until_stop = if a < 0.0 { -v / a } else { f64::INFINITY };
-        let t = time_s.min(HOLD_S).min(until_stop);
-        let then = (v + a * t).max(0.0);
-        (then, v * t + 0.5 * a * t * t + then * (time_s - t))
+        let before_s = time_s.min(reacted_s);
+        let held_s = before_s.min(HOLD_S);
+        let (v, held_m) = ballistic(n.speed_m_s.max(0.0), a, held_s);
+        let on_m = held_m + v * (before_s - held_s);
+        if time_s <= reacted_s || yielding.decel_m_s2 <= 0.0 {
+            return (v, on_m + v * (time_s - before_s));
+        }
+        let eases_s =
+            (time_s - reacted_s).min((v - yielding.down_to_m_s).max(0.0) / yielding.decel_m_s2);
+        let (then, eased_m) = ballistic(v, -yielding.decel_m_s2, eases_s);
+        (then, on_m + eased_m + then * (time_s - reacted_s - eases_s))
     }
 }
 
@@ -232,7 +256,7 @@ impl Gate {
     /// A vehicle is alongside in the target lane, or one must pass there.
     #[must_use]
     pub fn occupied(&self, strictness: &Strictness) -> bool {
-        self.kept_clear || self.occupied && !strictness.from_entry
+        self.kept_clear || self.occupied && !strictness.may_stop
     }
 
     /// Whether the planned change is safe; otherwise the reason.
@@ -250,14 +274,23 @@ impl Gate {
         if self.occupied(strictness) {
             return Err(LaneChangeRefusal::Occupied);
         }
-        let mut time_s = 0.0;
+        let down_to_m_s = course.start_m_s.min(course.end_m_s);
+        let (mut entry_s, mut time_s) = (None, 0.0);
         while time_s <= course.duration_s + self.reaction_s {
             let (v, travelled) = course.at(time_s);
             let d_m = path.at(road, s_m + travelled).d_m;
-            let beside = strictness.from_entry && !self.enters(road, path, s_m, travelled);
-            for c in self.concerns.iter().flatten().filter(|c| c.role == Role::OwnAhead || !beside)
-            {
-                self.check_one(c, time_s, v, travelled, d_m, strictness)?;
+            if entry_s.is_none() && self.enters(road, path, s_m, course.at(time_s + STEP_S).1) {
+                entry_s = Some(time_s);
+            }
+            // The body is in the lane within a step of the entry that counts for the gaps.
+            let to_indicator = strictness.yield_to_indicator;
+            let entered_s = entry_s.filter(|_| !to_indicator).map(|entry_s| entry_s + STEP_S);
+            let (seen_s, decel_m_s2) = (entered_s.unwrap_or(0.0), strictness.yield_decel_m_s2);
+            let yielding = Yielding { seen_s, to_indicator, decel_m_s2, down_to_m_s };
+            let counts = |c: &&Concern| c.role == Role::OwnAhead || entry_s.is_some();
+            for c in self.concerns.iter().flatten().filter(counts) {
+                let other = c.at(time_s, &yielding);
+                self.check_one(c, other, (v, travelled), d_m, strictness)?;
             }
             time_s += STEP_S;
         }
@@ -279,13 +312,11 @@ impl Gate {
     fn check_one(
         &self,
         c: &Concern,
-        time_s: f64,
-        v: f64,
-        travelled: f64,
+        (v_n, moved): (f64, f64),
+        (v, travelled): (f64, f64),
         d_m: f64,
         strictness: &Strictness,
     ) -> Result<(), LaneChangeRefusal> {
-        let (v_n, moved) = c.at(time_s, strictness.yield_decel_m_s2);
         let n = &c.neighbour;
         let ahead_m = n.rear_s_m + moved - (self.extent.front_s_m + travelled);
         let behind_m = self.extent.rear_s_m + travelled - (n.front_s_m + moved);

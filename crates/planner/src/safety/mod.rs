@@ -8,6 +8,8 @@
 //! | `guard` | the last check: stale input, jumps of the command, minimal risk |
 
 mod gate;
+#[cfg(test)]
+mod gate_tests;
 mod guard;
 mod rss;
 mod surroundings;

@@ -125,3 +125,84 @@ impl ReferenceSpeed {
         &self.points
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::reference_geometry;
+    use road::builtin;
+
+    /// What a truck in `lane` at `s_m` would drive without others, with this set speed, whatever a
+    /// plan of 12 m/s makes of its reference.
+    fn wish(road: &Road, lane: u16, s_m: f64, bounds: &SpeedBounds) -> ReferenceSpeed {
+        let mut planned = ReferenceSpeed::default();
+        planned.update(road, lane, s_m, &reference_geometry(), bounds, |_| Some(12.0));
+        let mut wish = ReferenceSpeed::default();
+        wish.update_like(&planned, bounds.set_speed_m_s);
+        wish
+    }
+
+    #[test]
+    fn the_wish_speed_is_the_set_speed_below_limits_and_curves_whatever_is_planned() {
+        let road = builtin::highway();
+        let (mut by_set_speed, mut by_limit, mut by_curve) = (0, 0, 0);
+        for (set_speed_m_s, curve_accel_m_s2, obey_speed_limits) in
+            [(18.0, 1.5, true), (35.0, 1.5, true), (35.0, 0.2, true), (35.0, 0.2, false)]
+        {
+            let bounds = SpeedBounds { set_speed_m_s, obey_speed_limits, curve_accel_m_s2 };
+            for s_m in (0..25).map(|i| 500.0 + 500.0 * f64::from(i)) {
+                let wish = wish(&road, 0, s_m, &bounds);
+                // By hand: the lowest under the whole combination, and what is reached from behind
+                // at 0.5 m/s² from anything lower ahead.
+                let mut by_hand = f64::INFINITY;
+                let mut reason = &mut by_set_speed;
+                let behind = (reference_geometry().length_m() / STEP_M).ceil() as i32;
+                for i in -behind..POINTS as i32 {
+                    let (off, mut here) = (STEP_M * f64::from(i), [ProfilePoint::default()]);
+                    road.profile(s_m + off, STEP_M, &mut here);
+                    let limit = if obey_speed_limits {
+                        road.lane_speed_limit_m_s(0, here[0].s_m)
+                    } else {
+                        f64::INFINITY
+                    };
+                    let bend = here[0].curvature_1_m.abs().max(1e-6);
+                    let curve = (curve_accel_m_s2 / bend).sqrt();
+                    for (bound, why) in [(set_speed_m_s, 0), (limit, 1), (curve, 2)] {
+                        let from_here = (bound * bound + off.max(0.0)).sqrt();
+                        if from_here < by_hand - 1e-9 {
+                            by_hand = from_here;
+                            reason = match why {
+                                0 => &mut by_set_speed,
+                                1 => &mut by_limit,
+                                _ => &mut by_curve,
+                            };
+                        }
+                    }
+                }
+                let (is, _) = wish.at(s_m).unwrap();
+                assert!((is - by_hand).abs() < 1e-6, "{bounds:?} at {s_m} m: {is} and {by_hand}");
+                *reason += 1;
+            }
+        }
+        assert!(by_set_speed > 10 && by_limit > 10 && by_curve > 10);
+    }
+
+    #[test]
+    fn the_wish_speed_falls_to_a_stop_before_a_lane_that_ends_and_waits_for_a_reference() {
+        let road = builtin::highway();
+        let ending = road.lanes().iter().find(|l| l.end != LaneEnd::Continues).unwrap();
+        let bounds =
+            SpeedBounds { set_speed_m_s: 20.0, obey_speed_limits: false, curve_accel_m_s2: 4.0 };
+        // 2 * 0.5 m/s² * room is what is left of v², to the 10 m step.
+        for room_m in [60.0, 150.0, 300.0] {
+            let stop_m = ending.s_end_m - reference_geometry().front_m - STOP_BEFORE_END_M;
+            let (is, _) =
+                wish(&road, ending.id, stop_m - room_m, &bounds).at(stop_m - room_m).unwrap();
+            let step = (is * is - room_m).abs();
+            assert!(step <= STEP_M + 1e-6, "{is} m/s with {room_m} m of room");
+        }
+        let mut before = ReferenceSpeed::default();
+        before.update_like(&ReferenceSpeed::default(), 20.0);
+        assert_eq!(before.at(0.0), None);
+    }
+}

@@ -57,8 +57,11 @@ pub struct LaneChangeConfig {
     pub time_to_collision_s: f64,
     /// Abort limits, as multiples of the lateral acceleration and jerk limits.
     pub abort_factor: f64,
+    /// Courtesy: deceleration with which those behind in the target lane are counted on to ease off
+    /// once they have seen the truck in their lane and reacted, m/s²; zero: they go on as they do.
+    pub courtesy_decel_m_s2: f64,
     /// Where the truck's lane ends: deceleration with which those behind in the target lane are
-    /// counted on to let it in, m/s².
+    /// counted on to let it in once they have reacted to its indicator, m/s².
     pub yield_decel_m_s2: f64,
 }
 
@@ -78,6 +81,7 @@ impl Default for LaneChangeConfig {
             entry_gap_factor: 1.05,
             time_to_collision_s: 4.0,
             abort_factor: 1.5,
+            courtesy_decel_m_s2: 1.0,
             yield_decel_m_s2: 2.0,
         }
     }
@@ -102,6 +106,7 @@ impl LaneChangeConfig {
         config_in("lane_change.entry_gap_factor", self.entry_gap_factor, 1.0, 3.0)?;
         config_in("lane_change.time_to_collision_s", self.time_to_collision_s, 0.0, 20.0)?;
         config_in("lane_change.abort_factor", self.abort_factor, 1.0, 3.0)?;
+        config_in("lane_change.courtesy_decel_m_s2", self.courtesy_decel_m_s2, 0.0, 2.0)?;
         config_in("lane_change.yield_decel_m_s2", self.yield_decel_m_s2, 0.0, 4.0)
     }
 
@@ -112,8 +117,13 @@ impl LaneChangeConfig {
             target_factor: self.entry_gap_factor,
             own_factor: 1.0,
             time_to_collision_s: self.time_to_collision_s,
-            yield_decel_m_s2: if lane_ends { self.yield_decel_m_s2 } else { 0.0 },
-            from_entry: lane_ends && start_m_s < self.speed_min_m_s,
+            yield_decel_m_s2: if lane_ends {
+                self.yield_decel_m_s2
+            } else {
+                self.courtesy_decel_m_s2
+            },
+            yield_to_indicator: lane_ends,
+            may_stop: lane_ends && start_m_s < self.speed_min_m_s,
         }
     }
 
