@@ -39,7 +39,7 @@ impl Recorder for Way {
 /// Starts in the climbing lane, with nothing but the lane's end to make it change.
 fn drive(density: Density, max_speed_m_s: f64, s_m: f64, speed_m_s: f64, seed: u64) -> Vec<String> {
     let mut s = Scenario::builtin("highway").unwrap();
-    s.traffic.family = Some(Family { density, max_speed_m_s });
+    s.traffic.family = Some(Family { density, max_speed_m_s, spawn_interval_s: None });
     s.ego.s_m = s_m;
     s.ego.lane = Some(2);
     s.ego.speed_m_s = speed_m_s;

@@ -324,13 +324,21 @@ fn sensors_change_what_the_stack_sees_and_not_what_the_run_is_judged_by() {
 
 #[test]
 fn the_six_families_are_built_in_with_the_papers_figures() {
+    for (prefix, spawn_interval_s) in [("", None), ("table2-", Some(0.4))] {
+        six_families(prefix, spawn_interval_s);
+    }
+}
+
+fn six_families(prefix: &str, spawn_interval_s: Option<f64>) {
     for (density, word) in
         [(Density::Dense, "dense"), (Density::Medium, "medium"), (Density::Sparse, "sparse")]
     {
         for (max_speed_m_s, number) in [(12.5, "12.5"), (15.0, "15")] {
-            let s = Scenario::builtin(&format!("{word}-{number}")).unwrap();
-            assert_eq!(s.traffic.family, Some(Family { density, max_speed_m_s }));
+            let s = Scenario::builtin(&format!("{prefix}{word}-{number}")).unwrap();
+            let family = Family { density, max_speed_m_s, spawn_interval_s };
+            assert_eq!(s.traffic.family, Some(family));
             let demand = s.traffic.demand(1);
+            assert_eq!(demand.spawn_interval_s, spawn_interval_s.unwrap_or(0.1));
             assert_eq!(demand.spawn_probability, density.spawn_probability());
             assert_eq!((demand.max_speed_m_s, s.stack.set_speed_m_s), (max_speed_m_s, 16.67));
         }

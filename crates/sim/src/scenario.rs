@@ -12,7 +12,7 @@ use crate::{SimError, TrafficSection};
 const RECORDED_LIMIT_M_S: f64 = 33.33;
 
 /// Built-in scenarios: name and text.
-const BUILTIN: [(&str, &str); 13] = [
+const BUILTIN: [(&str, &str); 19] = [
     ("highway", include_str!("../scenarios/highway.toml")),
     ("highway-sag", include_str!("../scenarios/highway-sag.toml")),
     ("highway-empty", include_str!("../scenarios/highway-empty.toml")),
@@ -26,6 +26,12 @@ const BUILTIN: [(&str, &str); 13] = [
     ("medium-15", include_str!("../scenarios/medium-15.toml")),
     ("sparse-12.5", include_str!("../scenarios/sparse-12.5.toml")),
     ("sparse-15", include_str!("../scenarios/sparse-15.toml")),
+    ("table2-dense-12.5", include_str!("../scenarios/table2-dense-12.5.toml")),
+    ("table2-dense-15", include_str!("../scenarios/table2-dense-15.toml")),
+    ("table2-medium-12.5", include_str!("../scenarios/table2-medium-12.5.toml")),
+    ("table2-medium-15", include_str!("../scenarios/table2-medium-15.toml")),
+    ("table2-sparse-12.5", include_str!("../scenarios/table2-sparse-12.5.toml")),
+    ("table2-sparse-15", include_str!("../scenarios/table2-sparse-15.toml")),
 ];
 
 /// A scenario. Unknown keys are refused.

@@ -79,6 +79,10 @@ pub struct Family {
     pub density: Density,
     /// Maximum speed of the traffic, m/s; 12.5 or 15 in the paper.
     pub max_speed_m_s: f64,
+    /// Interval that the spawn probability refers to, s; none: that of the demand under `native`,
+    /// 0.1 s, with which dense traffic is at capacity and no lane change gains anything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spawn_interval_s: Option<f64>,
 }
 
 /// SUMO and how it is started.
@@ -159,6 +163,7 @@ impl TrafficSection {
         if let Some(family) = self.family {
             demand.spawn_probability = family.density.spawn_probability();
             demand.max_speed_m_s = family.max_speed_m_s;
+            demand.spawn_interval_s = family.spawn_interval_s.unwrap_or(demand.spawn_interval_s);
             demand.initial_density_1_km = None;
         }
         demand

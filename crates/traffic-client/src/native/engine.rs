@@ -149,6 +149,12 @@ impl Engine {
         }
     }
 
+    /// Draws are those of another seed from now on.
+    pub(crate) fn reseed(&mut self, seed: u64) {
+        Arc::make_mut(&mut self.config).seed = seed;
+        self.minds = Minds::new(&self.config.human, seed, TICK_S, DECISION_TICKS);
+    }
+
     /// Fixes the accelerations and begins lane changes; the ego spans are those of this instant.
     pub(crate) fn decide(&mut self) {
         self.look_beyond();

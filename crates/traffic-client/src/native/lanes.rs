@@ -175,7 +175,7 @@ fn is_left_of_three(lanes: &[Lane], k: u16) -> bool {
 
 /// All lanes and the grade.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct LaneMap {
+pub struct LaneMap {
     pub(crate) lanes: Vec<Lane>,
     /// Off-ramps in the order of their stations.
     pub(crate) exits: Vec<u16>,

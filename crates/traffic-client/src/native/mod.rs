@@ -26,7 +26,7 @@ pub(crate) use ego::EgoSpans;
 pub use equilibrium::Capacity;
 pub(crate) use from_road::lane_map;
 pub use human::HumanConfig;
-pub(crate) use lanes::LaneMap;
+pub use lanes::LaneMap;
 pub(crate) use publish::carry_on;
 pub use source::{NativeCounts, NativeSnapshot, NativeTraffic};
 pub(crate) use takeover::stopping_gap_m;

@@ -30,8 +30,16 @@ pub(crate) fn progress_of(done: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Writes the vehicles within `radius_m` of `ego_s_m` into the scene, `tau_s` after the tick.
-pub(crate) fn publish(engine: &Engine, road: &Road, ego_s_m: f64, tau_s: f64, scene: &mut Scene) {
+/// Writes the vehicles within the scene's radius of `ego_s_m` into the scene, `tau_s` after the
+/// tick. Map poses are those on `poses`; NaN without.
+pub(crate) fn publish(
+    engine: &Engine,
+    road: &Road,
+    poses: Option<&Road>,
+    ego_s_m: f64,
+    tau_s: f64,
+    scene: &mut Scene,
+) {
     let (fleet, map) = (&engine.state.fleet, &engine.map);
     let radius_m = engine.config.scene_radius_m;
     let first = fleet.s_m.partition_point(|&s| s < ego_s_m - radius_m);
@@ -55,7 +63,11 @@ pub(crate) fn publish(engine: &Engine, road: &Road, ego_s_m: f64, tau_s: f64, sc
             d_m += done * way_m;
             lateral_speed_m_s += rate * way_m / driver.lane_change_s;
         }
-        let pose = road.at(middle_m, d_m);
+        let (x_m, y_m, yaw_rad) = poses.map_or((f64::NAN, f64::NAN, f64::NAN), |road| {
+            let at = road.at(middle_m, d_m);
+            let turned_rad = libm::atan2(lateral_speed_m_s, speed_m_s.max(1.0));
+            (at.x_m, at.y_m, at.heading_rad + turned_rad)
+        });
         scene.neighbours.push(Neighbour {
             id: fleet.id[i],
             class: driver.class,
@@ -68,9 +80,9 @@ pub(crate) fn publish(engine: &Engine, road: &Road, ego_s_m: f64, tau_s: f64, sc
             accel_m_s2: if speed_m_s > 0.0 { fleet.a_m_s2[i] } else { 0.0 },
             lane: fleet.lane[i],
             target_lane: (target != NO_LANE).then_some(target),
-            x_m: pose.x_m,
-            y_m: pose.y_m,
-            yaw_rad: pose.heading_rad + libm::atan2(lateral_speed_m_s, speed_m_s.max(1.0)),
+            x_m,
+            y_m,
+            yaw_rad,
         });
     }
     scene

@@ -8,6 +8,7 @@ use tractrix_core::{EgoState, Geometry, Scene, Time, TrafficSource};
 use super::boundary::Boundary;
 use super::config::TrafficConfig;
 use super::engine::{Engine, State, TICK_S};
+use super::lanes::LaneMap;
 use super::publish::publish;
 use super::workers::Workers;
 use crate::TrafficError;
@@ -24,6 +25,8 @@ pub struct NativeTraffic {
     /// Start of the current tick; `None` before the first call.
     tick_start: Option<Time>,
     scene: Scene,
+    /// Scenes have map poses.
+    map_poses: bool,
 }
 
 /// Everything that changes in a [`NativeTraffic`]: save it, restore it, the same bits go on.
@@ -61,18 +64,33 @@ impl NativeTraffic {
         geometry: Geometry,
         config: TrafficConfig,
     ) -> Result<Self, TrafficError> {
+        let map = Arc::new(super::from_road::lane_map(&road)?);
+        Self::with_map(map, road, geometry, config)
+    }
+
+    /// As [`NativeTraffic::new`] with the tables of the road that other traffic on it has already
+    /// ([`NativeTraffic::map`]).
+    ///
+    /// # Errors
+    /// As [`NativeTraffic::new`].
+    pub fn with_map(
+        map: Arc<LaneMap>,
+        road: Arc<Road>,
+        geometry: Geometry,
+        config: TrafficConfig,
+    ) -> Result<Self, TrafficError> {
         config.validate()?;
         config.schedule.validate(Some(&road))?;
-        let map = super::from_road::lane_map(&road)?;
         let warm_up = (config.warm_up_s / TICK_S) as u64;
-        let mut engine = Engine::new(Arc::new(config), Arc::new(map));
+        let mut engine = Engine::new(Arc::new(config), map);
         engine.fill();
         engine.state.plot.begin(warm_up, 0.0, &engine.config.schedule);
         for _ in 0..warm_up {
             engine.decide();
             engine.commit();
         }
-        Ok(Self { engine, road, geometry, tick_start: None, scene: Scene::default() })
+        let scene = Scene::default();
+        Ok(Self { engine, road, geometry, tick_start: None, scene, map_poses: true })
     }
 
     /// Traffic that goes on from the last scene of another source, as seen by an ego at `now`: its
@@ -122,6 +140,24 @@ impl NativeTraffic {
     /// Lets others do the work from now on: the bits stay the same.
     pub fn set_workers(&mut self, workers: Arc<dyn Workers>) {
         self.engine.workers = workers;
+    }
+
+    /// Tables of the road, for further traffic on it.
+    #[must_use]
+    pub fn map(&self) -> Arc<LaneMap> {
+        Arc::clone(&self.engine.map)
+    }
+
+    /// Whether scenes have map poses (the default). Without, `x_m`, `y_m` and `yaw_rad` are NaN and
+    /// a scene costs less; road coordinates are the same.
+    pub fn set_map_poses(&mut self, wanted: bool) {
+        self.map_poses = wanted;
+    }
+
+    /// Goes on with the draws of another seed: arrivals and drivers to come, what those on the road
+    /// judge from now on. Vehicles stay as they are.
+    pub fn reseed(&mut self, seed: u64) {
+        self.engine.reseed(seed);
     }
 
     /// Memory of a vehicle, bytes: its state and what is worked out about it in a tick.
@@ -238,7 +274,9 @@ impl TrafficSource for NativeTraffic {
             self.engine.decide();
         }
         self.tick_start = Some(start);
-        publish(&self.engine, &self.road, ego.s_m, now.seconds_since(start), &mut self.scene);
+        let poses = self.map_poses.then_some(&*self.road);
+        let tau_s = now.seconds_since(start);
+        publish(&self.engine, &self.road, poses, ego.s_m, tau_s, &mut self.scene);
         self.scene.time = now;
         Ok(&self.scene)
     }

@@ -326,3 +326,27 @@ fn a_restored_snapshot_goes_on_with_the_same_bits() {
     assert!(e.state == once);
     assert!(e.state != saved);
 }
+
+#[test]
+fn a_restored_state_with_another_seed_goes_on_as_that_seed_says() {
+    let road = Arc::new(road::builtin::flat(2_000.0));
+    let config = TrafficConfig { spawn_probability: 0.05, warm_up_s: 20.0, ..Default::default() };
+    let geometry = Geometry::default();
+    let first = NativeTraffic::new(Arc::clone(&road), geometry, config.clone()).unwrap();
+    let mut other = NativeTraffic::with_map(first.map(), road, geometry, config).unwrap();
+    assert_eq!(first.fingerprint(), other.fingerprint(), "the same tables, the same traffic");
+    let ego = EgoState { s_m: 1_000.0, d_m: 1.875, speed_m_s: 14.0, ..EgoState::default() };
+    let mut drive = |seed: Option<u64>| {
+        other.restore(&first.snapshot());
+        seed.into_iter().for_each(|seed| other.reseed(seed));
+        other.set_map_poses(seed.is_none());
+        let scene = other.advance(Time(0), &ego).unwrap();
+        assert!(scene.neighbours.iter().all(|n| n.x_m.is_finite() == seed.is_none()));
+        (1..300).for_each(|k| drop(other.advance(Time(k * 100_000_000), &ego).unwrap()));
+        other.fingerprint()
+    };
+    let (own, nine, nine_again, ten) =
+        (drive(None), drive(Some(9)), drive(Some(9)), drive(Some(10)));
+    assert_eq!(nine, nine_again);
+    assert!(own != nine && nine != ten);
+}
