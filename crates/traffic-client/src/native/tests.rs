@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use driver_models::{Idm, ballistic};
-use tractrix_core::{EgoState, Geometry};
+use tractrix_core::{EgoState, Geometry, Time, TrafficSource};
 
 use super::config::{Density, TrafficConfig};
 use super::driver::Driver;
 use super::engine::{Engine, TICK_S};
 use super::fleet::Fleet;
 use super::lanes::{LaneMap, LaneSource, LaneUse, NO_LANE};
+use super::source::NativeTraffic;
 
 fn engine(config: TrafficConfig, map: LaneMap) -> Engine {
     let mut e = Engine::new(Arc::new(config), Arc::new(map));
