@@ -55,6 +55,16 @@ pub enum SimError {
     /// Another failure of the loop.
     #[error("{0}")]
     Drive(String),
+    /// A batch was asked for what it cannot do.
+    #[error("batch: {what} = {value}: {why}")]
+    Batch {
+        /// Which argument or key.
+        what: &'static str,
+        /// The value given.
+        value: String,
+        /// What it must be.
+        why: String,
+    },
     /// The stack cannot be built from its configuration.
     #[error("stack: {0}")]
     Stack(#[from] planner::PlannerError),

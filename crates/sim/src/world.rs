@@ -6,9 +6,9 @@ use std::sync::Arc;
 use dynamics::TruckModel;
 use j1939::BitRate;
 use j1939::bus::Bus;
-use planner::{RatesConfig, Stack, StackConfig};
+use planner::{RatesConfig, Situation, Stack, StackConfig, Tactics};
 use road::Road;
-use tractrix_core::{Geometry, Recorder, Scene, Tick, Time, Vehicle, VehicleLimits};
+use tractrix_core::{Geometry, Recorder, Scene, Tick, Time, TrafficSource, Vehicle, VehicleLimits};
 
 use crate::ecu::Ahead;
 use crate::{
@@ -141,6 +141,22 @@ impl World {
             ghost.follow(now, self.plant.truck().state(), self.stack.plan().held_up);
         }
         Ok(self.plant.end_tick())
+    }
+
+    /// What the next tick will see, with tactics that have looked ahead from there: for who decides
+    /// outside. Changes nothing in the run.
+    pub(crate) fn look<R>(
+        &mut self,
+        look: impl FnOnce(&Tactics, &Situation<'_>) -> R,
+    ) -> Result<R, SimError> {
+        let (now, road) = (self.plant.now(), self.plant.limited_road());
+        let Plant { truck, traffic, .. } = &mut self.plant;
+        let ego = truck.ego(now)?.value;
+        let scene = traffic.advance(now, &ego)?;
+        let mut tactics = self.stack.tactics().clone();
+        let at = Situation { now, ego: &ego, scene, road: &road, limits: truck.limits() };
+        tactics.foresee(&at);
+        Ok(look(&tactics, &at))
     }
 
     /// Lets a ghost drive along from here on, before the first tick, unless the scenario wants none

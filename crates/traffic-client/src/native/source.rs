@@ -148,6 +148,12 @@ impl NativeTraffic {
         Arc::clone(&self.engine.map)
     }
 
+    /// The latest scene.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
     /// Whether scenes have map poses (the default). Without, `x_m`, `y_m` and `yaw_rad` are NaN and
     /// a scene costs less; road coordinates are the same.
     pub fn set_map_poses(&mut self, wanted: bool) {

@@ -1,0 +1,36 @@
+//! What an episode came to.
+
+use serde::Serialize;
+
+/// Figures of an episode, so far or at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct EpisodeStats {
+    /// Seed that the episode began with.
+    pub seed: u64,
+    /// Decisions.
+    pub decisions: u32,
+    /// Duration, s.
+    pub time_s: f64,
+    /// Sum of the rewards, s at the reference speed.
+    pub reward_s: f64,
+    /// Distance driven along the road, m.
+    pub distance_m: f64,
+    /// Sum over the steps of (v_ref - v)/v_ref, and their number.
+    pub(super) delta: (f64, u32),
+    /// Lane changes begun.
+    pub lane_changes: u32,
+    /// Changes turned back.
+    pub aborted: u32,
+    /// Wishes that were refused.
+    pub refused: u32,
+    /// The episode ended by touching another vehicle.
+    pub collided: bool,
+}
+
+impl EpisodeStats {
+    /// Mean of (v_ref - v)/v_ref.
+    #[must_use]
+    pub fn delta_speed_frac(&self) -> f64 {
+        self.delta.0 / f64::from(self.delta.1.max(1))
+    }
+}
