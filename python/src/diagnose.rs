@@ -56,7 +56,7 @@ pub(crate) fn diagnose_json(
 }
 
 /// Drives that cannot be diagnosed.
-fn of_drives(error: &DiagnosisError) -> Fault {
+pub(crate) fn of_drives(error: &DiagnosisError) -> Fault {
     match error {
         DiagnosisError::Io { path, .. } => Fault::file(path, error.to_string()),
         _ => Fault::Value(error.to_string()),

@@ -9,6 +9,7 @@
 
 mod decision;
 mod diagnose;
+mod drives;
 mod ego;
 mod fault;
 mod scenario;
@@ -30,6 +31,8 @@ const fn provenance(seed: u64) -> tractrix_core::Provenance {
 mod _native {
     #[pymodule_export]
     use crate::diagnose::diagnose_json;
+    #[pymodule_export]
+    use crate::drives::drives_from_logs;
     #[pymodule_export]
     use crate::scenario::{scenario_json, scenario_list};
     #[pymodule_export]

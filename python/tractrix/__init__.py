@@ -9,7 +9,9 @@ Road frame: s along the route, d to the left of its reference line. The ego's re
 centre of the tractor's drive-axle group, on the ground.
 """
 
+from tractrix import drives
 from tractrix._diagnosis import diagnose
+from tractrix._fleet import diagnose_many
 from tractrix._native import GIT_REVISION as __git_revision__
 from tractrix._native import VERSION as __version__
 from tractrix._native import Snapshot
@@ -27,6 +29,8 @@ __all__ = [
     "__git_revision__",
     "__version__",
     "diagnose",
+    "diagnose_many",
+    "drives",
     "read_run",
     "scenario",
     "scenarios",

@@ -17,6 +17,21 @@ def diagnose_json(
     seed: int,
     out: str | None,
 ) -> str: ...
+def drives_from_logs(
+    logs: list[str],
+    named: list[str],
+    masses_kg: list[float | None],
+    *,
+    truck: str,
+    out: str,
+    map: str | None,
+    start_s_m: float | None,
+    dbc: str | None,
+    signals: list[str],
+    standstill_s: float,
+    min_drive_s: float,
+    overwrite: bool,
+) -> str: ...
 
 class Snapshot: ...
 

@@ -37,6 +37,33 @@ pub enum DiagnosisError {
         /// How far it was read, s.
         until_s: f64,
     },
+    /// A log of a bus cannot be read, or holds nothing that can be used.
+    #[error("{path}: {why}")]
+    Log {
+        /// The log, as the user named it.
+        path: PathBuf,
+        /// What is wrong with it, with the line.
+        why: String,
+    },
+    /// A description of a maker's signals cannot be used.
+    #[error("{path}: {why}")]
+    Dbc {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, with message and signal.
+        why: String,
+    },
+    /// A drive cannot be laid on a road.
+    #[error("map {map}: {why}")]
+    Map {
+        /// The road, as the user named it.
+        map: String,
+        /// Why.
+        why: String,
+    },
+    /// A road cannot be read.
+    #[error("{0}")]
+    Road(String),
     /// A table cannot be decoded.
     #[error("{path}: {why}")]
     Table {
@@ -106,17 +133,33 @@ pub enum DiagnosisError {
         /// What is missing.
         what: String,
     },
-    /// The drives were made with another truck than the truck file describes.
+    /// A drive was made with another truck than the truck file describes.
     #[error(
-        "the drives do not belong to this truck file: engine speed over wheel speed in gear {gear} is {measured:.3}, the truck file says {expected:.3} (1/m, as (rad/s)/(m/s))"
+        "drive {drive} does not belong to this truck file: engine_speed_rpm over speed_m_s in gear {gear} is {measured:.3}, the truck file says {expected:.3} (1/m, as (rad/s)/(m/s)){hint}"
     )]
     WrongTruck {
+        /// Name of the first such drive.
+        drive: String,
         /// Gear with most data among those that disagree.
         gear: usize,
         /// Measured ratio, 1/m.
         measured: f64,
         /// Ratio of the truck file, 1/m.
         expected: f64,
+        /// What it could be instead, in words that go on.
+        hint: &'static str,
+    },
+    /// An engine cannot burn so much or so little for the work that it does.
+    #[error(
+        "drive {drive}: column fuel_rate_g_s makes {g_per_kwh:.0} g for a kWh at the crank, taken as g/s; an engine burns 180 to 300{hint}"
+    )]
+    FuelUnit {
+        /// Name of the drive.
+        drive: String,
+        /// Fuel over work, g/kWh.
+        g_per_kwh: f64,
+        /// The unit that it looks like, in words that go on.
+        hint: &'static str,
     },
     /// The truck file is not usable.
     #[error("truck: {0}")]

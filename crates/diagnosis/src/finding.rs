@@ -37,6 +37,13 @@ pub enum FindingKind {
         /// The first such value.
         value: f64,
     },
+    /// Values that are too far from those before for a truck to have moved there.
+    Jump {
+        /// How many.
+        samples: usize,
+        /// The first such value.
+        value: f64,
+    },
     /// The values fit the column after a change of unit.
     WrongUnit {
         /// The unit that it seems to be in.
@@ -120,6 +127,9 @@ impl core::fmt::Display for FindingKind {
             Self::NonFinite { samples } => write!(f, "{samples} samples are no numbers"),
             Self::Implausible { samples, value } => {
                 write!(f, "{samples} samples that no highway truck shows, the first is {value}")
+            }
+            Self::Jump { samples, value } => {
+                write!(f, "{samples} samples jump away from those before, the first to {value}")
             }
             Self::WrongUnit { suspected } => write!(f, "it seems to be in {suspected}"),
             Self::Stuck { seconds } => write!(f, "it stands still for {seconds:.1} s"),

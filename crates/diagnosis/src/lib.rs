@@ -57,6 +57,7 @@ mod search;
 mod sentence;
 mod stats;
 mod sure;
+mod table;
 mod table_trial;
 mod threads;
 mod unknown;
@@ -79,6 +80,7 @@ pub use plant::Plant;
 pub use read::{RawTable, read_drives, read_drives_with, read_table, read_traces};
 pub use replay::Module;
 pub use report_models::Models;
+pub use table::{Table, drives_index};
 pub use table_trial::{TableTrial, try_table};
 pub use threads::Threads;
 pub use verdict::{

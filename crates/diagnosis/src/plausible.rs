@@ -1,6 +1,6 @@
 //! Do the drives belong to this truck? Engine speed over wheel speed in every gear says so.
 
-use crate::{Channel as C, DiagnosisError, DriveSet, Plant};
+use crate::{Channel as C, DiagnosisError, Drive, DriveSet, Plant};
 
 /// Deviation of the overall ratio that no tyre wear or slip explains.
 const MAX_DEVIATION: f64 = 0.08;
@@ -49,26 +49,39 @@ pub(crate) fn check_length(set: &DriveSet) -> Result<(), DiagnosisError> {
     Ok(())
 }
 
+/// Fuel that no engine burns over a drive, g/kWh: with idling and every cause of the catalogue it
+/// stays between.
+const FUEL_G_PER_KWH: [f64; 2] = [120.0, 500.0];
+/// Work that a drive needs to be judged by its fuel, kWh.
+const LEAST_WORK_KWH: f64 = 2.0;
+
+/// Refuses drives of another truck, drive by drive: two trucks may lie in one folder.
 pub(crate) fn check_truck(plant: &Plant, set: &DriveSet) -> Result<(), DiagnosisError> {
+    for d in &set.drives {
+        check_ratios(plant, d)?;
+        check_fuel(plant, d)?;
+    }
+    Ok(())
+}
+
+/// Engine speed over wheel speed, gear by gear.
+fn check_ratios(plant: &Plant, d: &Drive) -> Result<(), DiagnosisError> {
     let driveline = &plant.truck.driveline;
     let gears = driveline.gear_ratios.len();
     let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); gears + 1];
     let mut beyond = 0_usize;
-    for d in &set.drives {
-        let (Some(v), Some(n), Some(g)) =
-            (d.get(C::SpeedMS), d.get(C::EngineSpeedRpm), d.get(C::Gear))
-        else {
+    let (Some(v), Some(n), Some(g)) = (d.get(C::SpeedMS), d.get(C::EngineSpeedRpm), d.get(C::Gear))
+    else {
+        return Ok(());
+    };
+    let shifting = d.get(C::ShiftInProcess);
+    for i in (0..d.len).step_by(7) {
+        if v[i] < 4.0 || shifting.is_some_and(|s| s[i] > 0.5) || g[i] < 1.0 {
             continue;
-        };
-        let shifting = d.get(C::ShiftInProcess);
-        for i in (0..d.len).step_by(7) {
-            if v[i] < 4.0 || shifting.is_some_and(|s| s[i] > 0.5) || g[i] < 1.0 {
-                continue;
-            }
-            match ratios.get_mut(g[i] as usize) {
-                Some(r) => r.push(n[i] / tractrix_core::RPM_PER_RAD_S / v[i]),
-                None => beyond += 1,
-            }
+        }
+        match ratios.get_mut(g[i] as usize) {
+            Some(r) => r.push(n[i] / tractrix_core::RPM_PER_RAD_S / v[i]),
+            None => beyond += 1,
         }
     }
     let total: usize = ratios.iter().map(Vec::len).sum();
@@ -88,11 +101,43 @@ pub(crate) fn check_truck(plant: &Plant, set: &DriveSet) -> Result<(), Diagnosis
         }
     }
     if total + beyond > 200 && 2 * wrong > total + beyond {
-        return Err(DiagnosisError::WrongTruck {
-            gear: worst.0,
-            measured: worst.1,
-            expected: worst.2,
-        });
+        let (gear, measured, expected, _) = worst;
+        let is = |factor: f64| (expected / measured / factor - 1.0).abs() < MAX_DEVIATION;
+        let hint = if is(3.6) {
+            "; speed_m_s seems to be in km/h"
+        } else if is(2.236_936) {
+            "; speed_m_s seems to be in mph"
+        } else {
+            ""
+        };
+        let drive = d.name.clone();
+        return Err(DiagnosisError::WrongTruck { drive, gear, measured, expected, hint });
     }
     Ok(())
+}
+
+/// Fuel over the work at the crank.
+fn check_fuel(plant: &Plant, d: &Drive) -> Result<(), DiagnosisError> {
+    let (Some(fuel), Some(torque), Some(n)) =
+        (d.get(C::FuelRateGS), d.get(C::EngineTorquePercent), d.get(C::EngineSpeedRpm))
+    else {
+        return Ok(());
+    };
+    let reference_nm = plant.truck.engine.reference_torque_nm;
+    let rows = fuel.iter().zip(torque).zip(n);
+    let (mut fuel_g, mut work_j) = (0.0, 0.0);
+    for ((fuel, torque), n) in rows {
+        fuel_g += fuel * Drive::STEP_S;
+        let power_w = 0.01 * torque * reference_nm * n / tractrix_core::RPM_PER_RAD_S;
+        work_j += power_w.max(0.0) * Drive::STEP_S;
+    }
+    let work_kwh = work_j / 3.6e6;
+    let g_per_kwh = fuel_g / work_kwh;
+    let [least, most] = FUEL_G_PER_KWH;
+    if work_kwh < LEAST_WORK_KWH || (least..=most).contains(&g_per_kwh) {
+        return Ok(());
+    }
+    let hint =
+        if (600.0..1500.0).contains(&g_per_kwh) { "; it seems to be in l/h or kg/h" } else { "" };
+    Err(DiagnosisError::FuelUnit { drive: d.name.clone(), g_per_kwh, hint })
 }

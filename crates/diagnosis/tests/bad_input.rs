@@ -6,7 +6,8 @@
 mod support;
 
 use diagnosis::{
-    Channel as C, Drive, DriveSet, Finding, FindingKind, Options, Plant, Serial, Verdict, diagnose,
+    Action, Channel as C, Drive, DriveSet, Finding, FindingKind, Options, Plant, Serial, Table,
+    Verdict, diagnose, drives_index, read_drives,
 };
 use dynamics::TruckParameters;
 use support::{Campaign, generate};
@@ -116,4 +117,141 @@ fn rows_in_random_order_name_no_cause() {
         }
     }
     assert_ne!(judge(&drives), Ok(true));
+}
+
+/// Generated drives written as tables, changed on the way, and read again.
+fn read_again(change: &dyn Fn(usize, C, &mut Vec<f64>)) -> Result<DriveSet, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let campaign = Campaign { drives: 2, duration_s: 400.0, tolerance: 1.0 };
+    let mut tables = Vec::new();
+    for (k, d) in generate(&[], &campaign, 5).drives.iter().enumerate() {
+        let time = (0..d.len).map(|i| Drive::STEP_S * i as f64).collect();
+        let mut columns = vec![("time_s", time)];
+        for c in C::all().filter(|c| d.has(*c)) {
+            let mut values = d.get(c).unwrap().to_vec();
+            change(k, c, &mut values);
+            if !values.is_empty() {
+                columns.push((c.name(), values));
+            }
+        }
+        let table = Table { name: format!("d{k}"), columns, ..Table::default() };
+        std::fs::write(folder.path().join(format!("d{k}.csv")), table.csv()).unwrap();
+        tables.push(table);
+    }
+    let index = drives_index("reference", &tables).unwrap();
+    std::fs::write(folder.path().join("drives.toml"), index).unwrap();
+    read_drives(folder.path()).map_err(|e| e.to_string())
+}
+
+/// One column of every drive times a factor.
+fn scaled(channel: C, factor: f64) -> DriveSet {
+    let change = |_, c: C, v: &mut Vec<f64>| {
+        if c == channel {
+            v.iter_mut().for_each(|x| *x *= factor);
+        }
+    };
+    read_again(&change).unwrap()
+}
+
+/// Units and jumps that were found: column, unit, what was done.
+fn suspected(set: &DriveSet) -> Vec<(String, String, Action)> {
+    let of = |f: &Finding| {
+        let what = match &f.kind {
+            FindingKind::WrongUnit { suspected } => (*suspected).to_owned(),
+            FindingKind::Jump { .. } => "jump".to_owned(),
+            _ => return None,
+        };
+        Some((f.channel.clone().unwrap(), what, f.action))
+    };
+    set.findings.iter().filter_map(of).collect()
+}
+
+#[test]
+fn drives_in_order_have_the_right_units() {
+    let set = read_again(&|_, _, _| {}).unwrap();
+    assert_eq!(suspected(&set), []);
+}
+
+#[test]
+fn units_that_are_off_by_the_usual_factors_are_findings() {
+    let degrees = 1.0_f64.to_degrees();
+    let cases = [
+        (C::SteeringWheelRad, degrees, "deg", Action::Corrected),
+        (C::YawRateRadS, degrees, "deg/s", Action::Corrected),
+        (C::BrakePressureKpa, 0.01, "bar", Action::Corrected),
+        (C::BrakePressureKpa, 1.0 / 6.894_757, "psi", Action::ChannelDropped),
+        (C::BrakePressureKpa, 1e3, "Pa", Action::Corrected),
+        (C::AcceleratorPedalFrac, 100.0, "percent", Action::Corrected),
+        (C::EngineTorquePercent, 0.01, "fraction", Action::Corrected),
+        (C::SpeedMS, 2.236_936, "mph", Action::Corrected),
+        (C::SpeedMS, 3.6, "km/h", Action::Corrected),
+        (C::BaroPressurePa, 1e-3, "kPa", Action::Corrected),
+    ];
+    for (channel, factor, unit, action) in cases {
+        let found = suspected(&scaled(channel, factor));
+        let expected = (channel.name().to_owned(), unit.to_owned(), action);
+        assert!(found.contains(&expected), "{channel:?} in {unit}: {found:?}");
+        assert!(found.iter().all(|f| f.0 == expected.0), "{channel:?} in {unit}: {found:?}");
+    }
+}
+
+#[test]
+fn fuel_per_hour_is_refused_with_drive_column_and_value() {
+    // a drive in which the engine never works hard: peaks are no sign of the unit there
+    let light = |_, c: C, v: &mut Vec<f64>| match c {
+        C::FuelRateGS => v.iter_mut().for_each(|x| *x *= 3.6 * 0.6),
+        C::EngineTorquePercent => v.iter_mut().for_each(|x| *x *= 0.6),
+        _ => {}
+    };
+    let light = read_again(&light).unwrap();
+    let error = judge(&light).expect_err(&format!("{:?}", light.findings));
+    for part in ["drive d0", "fuel_rate_g_s", "taken as g/s", "l/h or kg/h"] {
+        assert!(error.contains(part), "{error}");
+    }
+    // in litres the peaks are beyond any engine, and the column is not used
+    let findings = scaled(C::FuelRateGS, 3.6 / 0.84).findings;
+    let dropped = |f: &Finding| {
+        matches!(f.kind, FindingKind::Implausible { value, .. } if value > 80.0)
+            && f.action == Action::ChannelDropped
+    };
+    assert!(findings.iter().any(dropped), "{findings:?}");
+}
+
+#[test]
+fn a_speed_in_mph_without_a_receiver_is_refused_with_the_unit() {
+    let change = |_, c: C, v: &mut Vec<f64>| match c {
+        C::SpeedMS => v.iter_mut().for_each(|x| *x *= 2.236_936),
+        C::GpsSpeedMS => v.clear(),
+        _ => {}
+    };
+    let error = judge(&read_again(&change).unwrap()).unwrap_err();
+    assert!(error.contains("seems to be in mph"), "{error}");
+}
+
+#[test]
+fn of_two_trucks_in_one_folder_the_drive_of_the_other_is_named() {
+    let change = |k: usize, c: C, v: &mut Vec<f64>| {
+        if k == 1 && c == C::EngineSpeedRpm {
+            v.iter_mut().for_each(|x| *x *= 1.3);
+        }
+    };
+    let error = judge(&read_again(&change).unwrap()).unwrap_err();
+    assert!(error.contains("drive d1 does not belong"), "{error}");
+}
+
+#[test]
+fn a_receiver_that_jumps_is_a_finding_and_the_jump_is_bridged() {
+    for (channel, by) in [(C::GpsAltitudeM, 250.0), (C::GpsSpeedMS, -9.0)] {
+        let change = |_, c: C, v: &mut Vec<f64>| {
+            if c == channel {
+                v[3000..3020].iter_mut().for_each(|x| *x += by);
+            }
+        };
+        let set = read_again(&change).unwrap();
+        let expected = (channel.name().to_owned(), "jump".to_owned(), Action::Interpolated);
+        assert!(suspected(&set).contains(&expected), "{:?}", set.findings);
+        let clean = read_again(&|_, _, _| {}).unwrap();
+        let [jumped, right] = [&set, &clean].map(|s| s.drives[0].get(channel).unwrap()[3010]);
+        assert!((jumped - right).abs() < 3.0, "{channel:?}: {jumped} {right}");
+    }
 }

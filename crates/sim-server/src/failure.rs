@@ -112,6 +112,12 @@ impl From<RecordingError> for Failure {
     }
 }
 
+impl From<diagnosis::DiagnosisError> for Failure {
+    fn from(error: diagnosis::DiagnosisError) -> Self {
+        Self::input(error)
+    }
+}
+
 /// Folds line breaks and indentation into single spaces.
 pub(crate) fn one_line(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")

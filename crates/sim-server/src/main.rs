@@ -4,7 +4,6 @@
 //! recording and the viewers get its ticks over bounded channels, lossless to the recording, lossy
 //! to viewers. Only this crate knows an async runtime.
 
-mod bus_log;
 mod cli;
 mod cmd;
 mod dashboard;

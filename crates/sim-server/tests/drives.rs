@@ -137,3 +137,86 @@ fn a_log_of_a_run_on_a_built_in_road_finds_its_grade_by_position() {
     assert!(driven_m > 1_000.0 && last[speed_m_s] > 10.0, "{driven_m}");
     assert!(rows.windows(2).all(|w| w[1][s_m] > w[0][s_m]), "the place goes on");
 }
+
+/// A DBC with a message of the maker: speed in km/h, hand wheel in degrees, positive to the right.
+fn dbc(change: (&str, &str)) -> String {
+    let text = "VERSION \"\"\n\nNS_ :\n\nBS_:\n\nBU_: ECU\n\n\
+        BO_ 2566852641 OEM1: 8 ECU\n\
+        \x20SG_ Speed : 0|16@1+ (0.01,0) [0|250] \"km/h\" ECU\n\
+        \x20SG_ Wheel : 23|16@0- (0.1,0) [-2000|2000] \"deg\" ECU\n\
+        \x20SG_ Clutch : 32|8@1+ (1,0) [0|100] \"%\" ECU\n\n\
+        BA_DEF_ SG_ \"SPN\" INT 0 600000;\nBA_DEF_DEF_ \"SPN\" 0;\n\
+        BA_ \"SPN\" SG_ 2566852641 Speed 84;\n";
+    assert!(text.contains(change.0), "{change:?}");
+    text.replace(change.0, change.1)
+}
+
+/// Two minutes in which only the maker's message says anything.
+fn makers_log(to: &Path) {
+    let mut log = String::new();
+    for k in 0..2400 {
+        let t = 0.05 * f64::from(k);
+        let speed = ((54.0 + 18.0 * (0.1 * t).sin()) * 100.0).round() as u16;
+        let wheel = (10.0 * (0.2 * t).sin() * 10.0).round() as i16;
+        let ([s0, s1], [w0, w1]) = (speed.to_le_bytes(), wheel.to_be_bytes());
+        let data = format!("{s0:02X}{s1:02X}{w0:02X}{w1:02X}FFFFFFFF");
+        log.push_str(&format!("({:.6}) can0 18FF1021#{data}\n", 100.0 + t));
+    }
+    std::fs::write(to, log).unwrap();
+}
+
+#[test]
+fn a_maker_s_signals_fill_columns_by_name_and_by_number_in_the_column_s_unit() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    makers_log(&folder.path().join("own.log"));
+    std::fs::write(at("own.dbc"), dbc(("", ""))).unwrap();
+    let command = ["drives", "from-can", &at("own.log"), "--truck", "reference"];
+    let rest = ["--dbc", &at("own.dbc"), "--signal", "steering_wheel_rad=-OEM1.Wheel"];
+    let output = server(&[&command[..], &rest, &["--out", &at("drives")]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("speed_m_s from OEM1.Speed of 21 every 50 ms"), "{said}");
+    let table = std::fs::read_to_string(at("drives/own_1.csv")).unwrap();
+    let mut lines = table.lines();
+    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
+    let (time, speed, wheel) =
+        (column("time_s"), column("speed_m_s"), column("steering_wheel_rad"));
+    let mut rows = 0;
+    for row in lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>()) {
+        let t = row[time];
+        assert!((row[speed] - (15.0 + 5.0 * (0.1 * t).sin())).abs() < 0.02, "{row:?}");
+        assert!((row[wheel] + (10.0 * (0.2 * t).sin()).to_radians()).abs() < 0.01, "{row:?}");
+        rows += 1;
+    }
+    assert!(rows > 2000, "{rows}");
+}
+
+#[test]
+fn a_dbc_that_cannot_be_used_gets_one_line_that_names_the_signal() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    makers_log(&folder.path().join("own.log"));
+    let cases = [
+        (("Clutch : 32", "Clutch : 12"), "OEM1: Speed and Clutch overlap at bit 12"),
+        (("\"km/h\"", "\"l/h\""), "OEM1.Speed: unit \"l/h\" is none of speed_m_s"),
+        (("\"deg\"", "\"\""), "OEM1.Wheel: unit \"\" is none of steering_wheel_rad"),
+        (("SG_ Wheel", "SG_ Rad"), "steering_wheel_rad: no signal OEM1.Wheel"),
+        (("2566852641", "321"), "11-bit identifier"),
+        (("0|16@1+", "0|99@1+"), "99 bits are no number"),
+        (("BO_ 2566852641", "BO_ twelve"), "no DBC"),
+    ];
+    for (change, expected) in cases {
+        std::fs::write(at("own.dbc"), dbc(change)).unwrap();
+        let command = ["drives", "from-can", &at("own.log"), "--truck", "reference"];
+        let rest = ["--dbc", &at("own.dbc"), "--signal", "steering_wheel_rad=-OEM1.Wheel"];
+        let line = refused(&[&command[..], &rest, &["--out", &at("drives")]].concat());
+        assert!(line.contains(expected) && line.contains("own.dbc"), "{expected}: {line}");
+    }
+    std::fs::write(at("own.dbc"), dbc(("", ""))).unwrap();
+    let command = ["drives", "from-can", &at("own.log"), "--truck", "reference"];
+    let rest = ["--dbc", &at("own.dbc"), "--signal", "colour=Wheel", "--out", &at("drives")];
+    let line = refused(&[&command[..], &rest].concat());
+    assert!(line.contains("colour is no column"), "{line}");
+}

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::collect::{Key, Log, Series, candidate_is};
-use super::signals::{CANDIDATES, Candidate, Silence, What};
+use super::collect::{Key, Log, Series};
+use super::signals::{Candidate, Silence, What};
 use crate::Channel;
 
 /// A source must have a number for so much of the log.
@@ -15,7 +15,7 @@ pub struct Choice {
     /// The column.
     pub column: &'static str,
     /// The message and signal.
-    pub signal: &'static str,
+    pub signal: String,
     /// Channel of the log, counted from 0.
     pub channel: usize,
     /// Address of the sender, of a request that of the receiver.
@@ -39,7 +39,7 @@ pub struct Unfilled {
 
 /// What was chosen for one place.
 pub(super) struct Chosen<'a> {
-    pub(super) candidate: &'static Candidate,
+    pub(super) candidate: &'a Candidate,
     pub(super) key: Key,
     pub(super) series: &'a Series,
 }
@@ -48,12 +48,12 @@ pub(super) struct Chosen<'a> {
 /// the highest rate, then that with the smallest address.
 pub(super) fn choose(log: &Log, what: What) -> Option<Chosen<'_>> {
     let fit = |(key, series): (&Key, &'_ Series)| {
-        let candidate = CANDIDATES.get(key.candidate)?;
+        let candidate = log.candidates.get(key.candidate)?;
         let is_request = candidate.silence == Silence::Zero && !series.samples.is_empty();
         let fresh = is_request || series.fresh_frac(log.duration_s) >= LEAST_FRESH_FRAC;
         (candidate.what == what && fresh).then_some((*key, candidate))
     };
-    let mut fitting: Vec<(Key, &'static Candidate)> = log.series.iter().filter_map(fit).collect();
+    let mut fitting: Vec<(Key, &Candidate)> = log.series.iter().filter_map(fit).collect();
     fitting.sort_by(|a, b| {
         let period = |key: &Key| log.series.get(key).map_or(f64::INFINITY, |s| s.period_s);
         a.0.candidate
@@ -77,17 +77,15 @@ impl Chosen<'_> {
 
     pub(super) fn said(&self, log: &Log, channel: Channel) -> Choice {
         let others = log.series.iter().filter(|(key, series)| {
-            **key != self.key
-                && candidate_is(key.candidate, self.candidate.what)
-                && !series.samples.is_empty()
+            **key != self.key && log.is_for(key, self.candidate.what) && !series.samples.is_empty()
         });
         let name = |key: &Key| {
-            let signal = CANDIDATES.get(key.candidate).map_or("", |c| c.signal);
+            let signal = log.candidates.get(key.candidate).map_or("", |c| &*c.signal);
             format!("{signal} of {:02X} on channel {}", key.address, key.channel)
         };
         Choice {
             column: channel.name(),
-            signal: self.candidate.signal,
+            signal: self.candidate.signal.to_string(),
             channel: self.key.channel,
             address: self.key.address,
             period_s: self.series.period_s,
@@ -100,11 +98,11 @@ impl Chosen<'_> {
 /// Why nobody fills a column.
 pub(super) fn why_not(log: &Log, what: What) -> String {
     let wanted: Vec<&str> =
-        CANDIDATES.iter().filter(|c| c.what == what).map(|c| c.signal).collect();
+        log.candidates.iter().filter(|c| c.what == what).map(|c| &*c.signal).collect();
     if wanted.is_empty() {
         return "no message of the standard has it".to_owned();
     }
-    let of_it = || log.series.iter().filter(|(k, _)| candidate_is(k.candidate, what));
+    let of_it = || log.series.iter().filter(|(k, _)| log.is_for(k, what));
     let numbers: usize = of_it().map(|(_, s)| s.samples.len()).sum();
     let states: usize = of_it().map(|(_, s)| s.no_number).sum();
     let wanted = wanted.join(" or ");

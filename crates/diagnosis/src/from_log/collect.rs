@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use j1939::message::{Tsc1, Xbr};
-use j1939::{Id, Message, MessageTable};
+use j1939::{Id, Message};
 use tractrix_core::Time;
 
-use super::signals::{CANDIDATES, What};
+use super::dbc::Dbc;
+use super::signals::{Candidate, Read, What, standard};
 use crate::DiagnosisError;
 
 /// Most samples that are kept of a log, all signals together: two days of every signal at its usual
@@ -66,8 +67,10 @@ impl Series {
 }
 
 /// A log of a bus, message by message.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Log {
+    /// What can fill a column, the better first.
+    pub(super) candidates: Vec<Candidate>,
     pub(super) series: BTreeMap<Key, Series>,
     first: Option<Time>,
     pub(super) duration_s: f64,
@@ -76,10 +79,16 @@ pub struct Log {
 }
 
 impl Log {
-    /// An empty log.
+    /// An empty log, of whose signals some are a maker's own.
+    ///
+    /// The signals that the user named come before the standard's, those found by their number (SPN)
+    /// after them.
     #[must_use]
-    pub fn new() -> Self {
-        Self::default()
+    pub fn new(dbc: Option<&Dbc>) -> Self {
+        let (named, by_number) = dbc.map(Dbc::candidates).unwrap_or_default();
+        let candidates = [named, standard(), by_number].concat();
+        let series = BTreeMap::new();
+        Self { candidates, series, first: None, duration_s: 0.0, samples: 0, messages: 0 }
     }
 
     /// Takes a message, of one frame or put together by the transport, heard on a channel of the log.
@@ -98,19 +107,18 @@ impl Log {
         let time_s = time.seconds_since(first);
         self.messages += 1;
         self.duration_s = self.duration_s.max(time_s);
-        let Some(table) = MessageTable::of(id.pgn()) else { return Ok(()) };
-        for (candidate, c) in CANDIDATES.iter().enumerate() {
-            if c.message.pgn != table.pgn {
+        for (candidate, c) in self.candidates.iter().enumerate() {
+            if c.pgn != id.pgn() {
                 continue;
             }
             // requests go to somebody, all else comes from somebody
-            let is_request = REQUESTS.contains(&table.pgn);
+            let is_request = REQUESTS.contains(&c.pgn) && matches!(c.read, Read::Standard(_));
             let address = if is_request { id.da() } else { id.sa() };
             if !c.only.is_empty() && !c.only.contains(&address) {
                 continue;
             }
             let series = self.series.entry(Key { candidate, channel, address }).or_default();
-            match (c.read)(id, bytes) {
+            match c.value(id, bytes) {
                 Some(value) => {
                     self.samples += 1;
                     series.samples.push((time_s, value));
@@ -129,9 +137,14 @@ impl Log {
         self.series.values_mut().for_each(Series::settle);
     }
 
+    /// Whether what a key names is wanted for this.
+    pub(super) fn is_for(&self, key: &Key, what: What) -> bool {
+        self.candidates.get(key.candidate).is_some_and(|c| c.what == what)
+    }
+
     /// The median of what a signal says, from whoever says it most.
     pub(super) fn median(&self, what: What) -> Option<f64> {
-        let of_it = self.series.iter().filter(|(k, _)| candidate_is(k.candidate, what));
+        let of_it = self.series.iter().filter(|(k, _)| self.is_for(k, what));
         let (_, series) = of_it.max_by_key(|(_, s)| s.samples.len())?;
         let mut values: Vec<f64> = series.samples.iter().map(|s| s.1).collect();
         let middle = values.len() / 2;
@@ -142,7 +155,3 @@ impl Log {
 
 /// Groups that ask somebody for something.
 const REQUESTS: [u32; 2] = [Tsc1::TABLE.pgn, Xbr::TABLE.pgn];
-
-pub(super) fn candidate_is(candidate: usize, what: What) -> bool {
-    CANDIDATES.get(candidate).is_some_and(|c| c.what == what)
-}

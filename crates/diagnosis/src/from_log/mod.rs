@@ -11,10 +11,14 @@
 //! | `choose` | who is believed |
 //! | `trips` | where a drive begins and ends |
 //! | `place` | where on a map it was |
+//! | `dbc` | signals of the truck's maker, by a file of the user |
+//! | `folder` | logs and a map into a folder of drives: all of it for a shell |
 //! | `grade` | its grade where there is no map |
 
 mod choose;
 mod collect;
+mod dbc;
+mod folder;
 mod grade;
 mod place;
 mod signals;
@@ -24,6 +28,8 @@ use serde::Serialize;
 
 pub use choose::{Choice, Unfilled};
 pub use collect::Log;
+pub use dbc::{Assigned, Dbc};
+pub use folder::{DriveFolder, Job, LogFile, Map, Project, Report, open};
 pub use place::{Locate, OnRoad};
 pub use trips::Span;
 
@@ -181,7 +187,7 @@ fn drive(
     for (channel, source) in chosen {
         let mut values: Vec<f64> = times.iter().map(|&t| source.at(t)).collect();
         match channel {
-            Channel::FuelRateGS => {
+            Channel::FuelRateGS if source.candidate.is_volume => {
                 values.iter_mut().for_each(|v| *v *= 1e3 * fuel_density_kg_m3);
             }
             Channel::HeadingRad => unwrap(&mut values),

@@ -20,6 +20,8 @@ const SLOWEST_STEP_S: f64 = 5.0;
 const MAX_BAD_FRAC: f64 = 0.02;
 /// A channel that must move and does not for this long while the truck drives is stuck, s.
 const STUCK_S: f64 = 30.0;
+/// A receiver's jump back or forth is over by then, s.
+const LEAP_S: f64 = 3.0;
 /// Spread of a road speed that is held, m/s: an engine speed in whole steps rests then.
 const HELD_M_S: f64 = 0.05;
 
@@ -80,11 +82,12 @@ pub(super) fn to_grid(
         return Err(column("speed_m_s", "missing or unusable"));
     };
     speed_unit(&mut drive, &mut speed, &mut note);
+    super::units::compare(&mut drive, &mut note);
     stuck(&mut drive, &speed, &mut note);
     Ok(drive)
 }
 
-type Note<'a> = dyn FnMut(Option<&str>, Option<f64>, FindingKind, Action) + 'a;
+pub(super) type Note<'a> = dyn FnMut(Option<&str>, Option<f64>, FindingKind, Action) + 'a;
 
 /// Rows with finite, increasing time.
 fn usable_rows(
@@ -201,9 +204,53 @@ fn clean(channel: Channel, t: &[f64], v: &mut [f64], note: &mut Note<'_>) -> boo
             return false;
         }
     }
-    let mask: Vec<bool> = bad.iter().zip(&outside).map(|(a, b)| *a || *b).collect();
+    let leaps = leaps(channel, t, v, &bad);
+    let leapt = leaps.iter().filter(|b| **b).count();
+    if leapt > 0 {
+        let value = v.iter().zip(&leaps).find(|p| *p.1).map_or(f64::NAN, |p| *p.0);
+        let ok = enough(leapt + implausible + missing);
+        let action = if ok { Action::Interpolated } else { Action::ChannelDropped };
+        note(name, first(&leaps), FindingKind::Jump { samples: leapt, value }, action);
+        if !ok {
+            return false;
+        }
+    }
+    let bad = bad.iter().zip(&outside).zip(&leaps);
+    let mask: Vec<bool> = bad.map(|((a, b), c)| *a || *b || *c).collect();
     interpolate_over(t, v, &mask);
     true
+}
+
+/// What a receiver can show from one sample to the next: a step, and a rate per second.
+fn most_change(channel: Channel) -> Option<(f64, f64)> {
+    match channel {
+        Channel::GpsSpeedMS => Some((3.0, 4.0)),
+        Channel::GpsAltitudeM => Some((15.0, 10.0)),
+        _ => None,
+    }
+}
+
+/// Samples of a receiver that are too far from the last good one; what stays there for longer than
+/// [`LEAP_S`] is believed again.
+fn leaps(channel: Channel, t: &[f64], v: &[f64], bad: &[bool]) -> Vec<bool> {
+    let mut found = vec![false; v.len()];
+    let Some((step, rate)) = most_change(channel) else { return found };
+    let mut good: Option<usize> = None;
+    for i in 0..v.len() {
+        if bad[i] {
+            continue;
+        }
+        let far = good.is_some_and(|k| {
+            let seconds = t[i] - t[k];
+            seconds < LEAP_S && (v[i] - v[k]).abs() > step + rate * seconds
+        });
+        if far {
+            found[i] = true;
+        } else {
+            good = Some(i);
+        }
+    }
+    found
 }
 
 /// Units that are often mistaken and leave a range that no truck shows.

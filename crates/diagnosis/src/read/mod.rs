@@ -3,6 +3,7 @@
 mod csv_table;
 mod grid;
 mod parquet_table;
+mod units;
 
 use std::path::Path;
 

@@ -4,11 +4,13 @@ mod content;
 mod print;
 mod wanted;
 
+use std::io::BufRead;
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
+use j1939::bus::BusError;
+use j1939::bus::candump::{Heard, Told, messages};
 
-use crate::bus_log::{self, Heard};
 use crate::failure::Failure;
 use crate::output;
 use content::Content;
@@ -53,9 +55,18 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let wanted = Wanted::of(&args.signals)?;
     let mut decoder =
         Decoder { wanted, printer: Printer::new(args.format)?, counts: Counts::default() };
-    let told = bus_log::read(&args.log, &mut |heard| {
-        decoder.message(heard)?;
+    let input: Box<dyn BufRead> = if args.log.as_os_str() == "-" {
+        Box::new(std::io::stdin().lock())
+    } else {
+        diagnosis::from_log::open(&args.log).map_err(|e| Failure::file(&args.log, e))?
+    };
+    let told = messages(input, &mut |heard| {
+        decoder.message(heard).map_err(Stop::Print)?;
         Ok(!decoder.printer.nobody_reads())
+    });
+    let told = told.map_err(|e| match e {
+        Stop::Log(e) => Failure::file(&args.log, e),
+        Stop::Print(failure) => failure,
     })?;
     if decoder.printer.nobody_reads() {
         return Ok(());
@@ -63,6 +74,18 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     decoder.printer.finish()?;
     output::note(&decoder.counts.summary(&told));
     Ok(())
+}
+
+/// Why reading ends before the log does.
+enum Stop {
+    Log(BusError),
+    Print(Failure),
+}
+
+impl From<BusError> for Stop {
+    fn from(error: BusError) -> Self {
+        Self::Log(error)
+    }
 }
 
 /// What goes through a command.
@@ -90,7 +113,7 @@ impl Decoder {
 }
 
 impl Counts {
-    fn summary(&self, told: &bus_log::Told) -> String {
+    fn summary(&self, told: &Told) -> String {
         format!(
             "{} frames on {} channels: {} messages decoded, {} too short or no text, {} not \
              in the table; {} transported, {} of them broken off; skipped {} frames with 11-bit \

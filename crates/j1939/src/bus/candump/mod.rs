@@ -6,10 +6,12 @@
 //! ```
 
 mod line;
+mod messages;
 mod read;
 mod replay;
 mod write;
 
+pub use messages::{Heard, Told, messages};
 pub use read::{Entry, Reader, Skipped};
 pub use replay::{Pace, Replay};
 pub use write::{Form, write};

@@ -6,9 +6,10 @@ use j1939::Slot;
 use serde_json::{Map, Value, json};
 use tractrix_core::Time;
 
+use j1939::bus::candump::Heard;
+
 use super::Format;
 use super::content::{Content, Item, Said};
-use crate::bus_log::Heard;
 use crate::failure::Failure;
 use crate::output::Lines;
 

@@ -77,7 +77,7 @@ pub(super) fn measure(out: &OutFolder, seed: u64, threads: &Threads) -> Result<H
         let name = if clean { format!("clean_{}", i - DRIVES) } else { format!("drive_{i}") };
         one_drive(name, &scenario, &road, of, seed, i as u64)
     });
-    let mut tables: Vec<folder::Table> = tables.into_iter().collect::<Result<_, _>>()?;
+    let mut tables: Vec<diagnosis::Table> = tables.into_iter().collect::<Result<_, _>>()?;
     let clean = tables.split_off(DRIVES);
     folder::write(&drives_at, TRUCK, &tables)?;
     folder::write(&out.begin("baseline")?, TRUCK, &clean)?;
@@ -124,7 +124,7 @@ fn one_drive(
     truck: &TruckParameters,
     seed: u64,
     index: u64,
-) -> Result<folder::Table, Failure> {
+) -> Result<diagnosis::Table, Failure> {
     let seed = seed.wrapping_mul(1_000).wrapping_add(index + 1);
     let mut draw = Draw::of_seed(seed ^ 0x5eed);
     let mut scenario = scenario.clone();

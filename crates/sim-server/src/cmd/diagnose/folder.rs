@@ -1,8 +1,8 @@
-//! A folder of measured drives, written as the contract has it: `drives.toml` and CSV tables.
+//! Writes a folder of measured drives as the contract has it.
 
 use std::path::Path;
 
-use serde::Serialize;
+use diagnosis::{Table, drives_index};
 
 use crate::failure::Failure;
 use crate::out_folder::write_whole;
@@ -10,92 +10,12 @@ use crate::out_folder::write_whole;
 /// Table rate of a drive, s.
 pub(crate) const STEP_S: f64 = 0.05;
 
-/// One drive.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(crate) struct Table {
-    /// Name of the drive.
-    pub(crate) name: String,
-    /// Mass on the load sheet, kg; none: the truck file's.
-    pub(crate) reported_mass_kg: Option<f64>,
-    /// Whether the tyres were warm at the start; none: not known.
-    pub(crate) tyres_warm_at_start: Option<bool>,
-    /// The map table beside it.
-    pub(crate) map: Option<String>,
-    /// Columns by name, of equal length; the first is `time_s`.
-    pub(crate) columns: Vec<(&'static str, Vec<f64>)>,
-}
-
-impl Table {
-    /// A table with these columns and no rows.
-    pub(crate) fn new(name: String, columns: &[&'static str]) -> Self {
-        let columns = columns.iter().map(|c| (*c, Vec::new())).collect();
-        Self { name, columns, tyres_warm_at_start: Some(false), ..Self::default() }
-    }
-
-    /// Appends a row.
-    pub(crate) fn push(&mut self, row: &[f64]) {
-        for ((_, column), value) in self.columns.iter_mut().zip(row) {
-            column.push(*value);
-        }
-    }
-
-    /// The table as text.
-    pub(crate) fn csv(&self) -> String {
-        let rows = self.columns.first().map_or(0, |c| c.1.len());
-        let mut text = self.columns.iter().map(|c| c.0).collect::<Vec<_>>().join(",");
-        for i in 0..rows {
-            text.push('\n');
-            for (k, (_, column)) in self.columns.iter().enumerate() {
-                if k > 0 {
-                    text.push(',');
-                }
-                // a millionth is below the resolution of every channel
-                let value = (column.get(i).copied().unwrap_or(f64::NAN) * 1e6).round() / 1e6;
-                text.push_str(&value.to_string());
-            }
-        }
-        text.push('\n');
-        text
-    }
-}
-
-#[derive(Serialize)]
-struct Index<'a> {
-    schema: u32,
-    truck: &'a str,
-    drive: Vec<Entry>,
-}
-
-#[derive(Serialize)]
-struct Entry {
-    name: String,
-    file: String,
-    map: Option<String>,
-    reported_mass_kg: Option<f64>,
-    tyres_warm_at_start: Option<bool>,
-}
-
-/// `drives.toml` of drives of a truck.
-///
-/// # Errors
-/// [`Failure::Work`] if it cannot be serialised.
-pub(crate) fn index(truck: &str, tables: &[Table]) -> Result<String, Failure> {
-    let entry = |t: &Table| Entry {
-        name: t.name.clone(),
-        file: format!("{}.csv", t.name),
-        map: t.map.clone(),
-        reported_mass_kg: t.reported_mass_kg,
-        tyres_warm_at_start: t.tyres_warm_at_start,
-    };
-    let index = Index { schema: 1, truck, drive: tables.iter().map(entry).collect() };
-    toml::to_string(&index).map_err(Failure::work)
-}
-
 /// Writes a folder of drives of a truck.
 pub(crate) fn write(folder: &Path, truck: &str, tables: &[Table]) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|e| Failure::writing(folder, &e))?;
     for table in tables {
         write_whole(&folder.join(format!("{}.csv", table.name)), table.csv().as_bytes())?;
     }
-    write_whole(&folder.join("drives.toml"), index(truck, tables)?.as_bytes())
+    let index = drives_index(truck, tables).map_err(Failure::work)?;
+    write_whole(&folder.join("drives.toml"), index.as_bytes())
 }

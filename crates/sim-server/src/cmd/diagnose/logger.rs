@@ -9,7 +9,9 @@ use road::Road;
 use sim::{Scenario, Status, World};
 use tractrix_core::{Command, EgoState, Recorder, Tick};
 
-use super::folder::{STEP_S, Table};
+use diagnosis::Table;
+
+use super::folder::STEP_S;
 use crate::failure::Failure;
 
 /// Name of the time column.

@@ -13,7 +13,9 @@ use recording::{Entry, Wanted};
 use sim::Scenario;
 use tractrix_core::ZERO_DEGC_K;
 
-use super::folder::{STEP_S, Table};
+use diagnosis::Table;
+
+use super::folder::STEP_S;
 use crate::failure::Failure;
 
 /// Name of a recording in its folder.

@@ -1,14 +1,12 @@
-//! Logs of a bus, message by message: what the transport puts together is one message.
+//! A log message by message: what the transport puts together is one message.
 
 use std::io::BufRead;
-use std::path::Path;
 
-use j1939::bus::candump::{Reader, Skipped};
-use j1939::bus::{Bus, BusError};
-use j1939::{Frame, GLOBAL_ADDRESS, Id, TpEvent, Transport};
 use tractrix_core::{Stamped, Time};
 
-use crate::failure::Failure;
+use super::{Reader, Skipped};
+use crate::bus::{Bus, BusError};
+use crate::{Frame, GLOBAL_ADDRESS, Id, TpEvent, Transport};
 
 /// Transported messages under way at once, on each channel; more are counted as broken.
 const SESSIONS: usize = 256;
@@ -21,41 +19,49 @@ const TRANSPORT: [u32; 4] = [0xEC00, 0xEB00, 0xC800, 0xC700];
 
 /// A message, out of one frame or of many.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Heard<'a> {
-    pub(crate) time: Time,
-    /// Number and name of the channel.
-    pub(crate) channel_number: usize,
-    pub(crate) channel: &'a str,
-    pub(crate) id: Id,
+pub struct Heard<'a> {
+    /// Time in the log.
+    pub time: Time,
+    /// Number of the channel, in the order in which they came.
+    pub channel_number: usize,
+    /// Name of the channel.
+    pub channel: &'a str,
+    /// Identifier.
+    pub id: Id,
     /// Destination; of a group that goes to everybody an address too, when it is transported.
-    pub(crate) da: u8,
-    pub(crate) bytes: &'a [u8],
+    pub da: u8,
+    /// Payload.
+    pub bytes: &'a [u8],
 }
 
 /// What a log had in it.
-#[derive(Debug, Default)]
-pub(crate) struct Told {
-    pub(crate) frames: u64,
-    pub(crate) channels: usize,
-    pub(crate) transported: u64,
-    pub(crate) broken: u64,
-    pub(crate) skipped: Skipped,
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Told {
+    /// J1939 frames.
+    pub frames: u64,
+    /// Channels.
+    pub channels: usize,
+    /// Messages that the transport put together.
+    pub transported: u64,
+    /// Messages of several frames that broke off.
+    pub broken: u64,
+    /// What is no J1939 frame.
+    pub skipped: Skipped,
 }
 
-/// Reads a log of candump, in either of its forms, or compressed (`.gz`); `-` is standard input. `hear` says whether to go
-/// on.
+/// Reads a log of candump, in either of its forms. `hear` says whether to go on.
 ///
 /// # Errors
-/// [`Failure::Input`] for a log that cannot be read, with the line, and what `hear` fails with.
-pub(crate) fn read(
-    log: &Path,
-    hear: &mut dyn FnMut(&Heard<'_>) -> Result<bool, Failure>,
-) -> Result<Told, Failure> {
-    let mut reader = Reader::new(open(log)?);
+/// [`BusError`] with the line for a log that cannot be read, and what `hear` fails with.
+pub fn messages<E: From<BusError>>(
+    log: impl BufRead,
+    hear: &mut dyn FnMut(&Heard<'_>) -> Result<bool, E>,
+) -> Result<Told, E> {
+    let mut reader = Reader::new(log);
     let mut told = Told::default();
     let mut transports: Vec<Transport<SESSIONS, MESSAGE_BYTES>> = Vec::new();
     while let Some(entry) = reader.next() {
-        let entry = entry.map_err(|e| Failure::file(log, e))?;
+        let entry = entry?;
         let (time, frame, number) = (entry.heard.time, entry.heard.value, entry.channel);
         let channel = reader.channels().get(number).map_or("", String::as_str);
         transports.resize_with(transports.len().max(number + 1), Transport::listener);
@@ -84,30 +90,19 @@ pub(crate) fn read(
     Ok(told)
 }
 
-fn open(log: &Path) -> Result<Box<dyn BufRead>, Failure> {
-    if log.as_os_str() == "-" {
-        return Ok(Box::new(std::io::stdin().lock()));
-    }
-    let file = std::fs::File::open(log).map_err(|e| Failure::file(log, e))?;
-    if log.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
-        return Ok(Box::new(std::io::BufReader::new(flate2::read::MultiGzDecoder::new(file))));
-    }
-    Ok(Box::new(std::io::BufReader::new(file)))
-}
-
 /// A packet of a longer message, and the messages that end with it.
-fn transported(
+fn transported<E: From<BusError>>(
     transport: &mut Transport<SESSIONS, MESSAGE_BYTES>,
     frame: &Frame,
     from: &Heard<'_>,
     told: &mut Told,
-    hear: &mut dyn FnMut(&Heard<'_>) -> Result<bool, Failure>,
-) -> Result<bool, Failure> {
+    hear: &mut dyn FnMut(&Heard<'_>) -> Result<bool, E>,
+) -> Result<bool, E> {
     let time = from.time;
     // first what is overdue: a packet that comes too late belongs to nothing
-    transport.poll(time, &mut Nowhere).map_err(Failure::work)?;
+    transport.poll(time, &mut Nowhere)?;
     transport.on_frame(time, frame);
-    transport.poll(time, &mut Nowhere).map_err(Failure::work)?;
+    transport.poll(time, &mut Nowhere)?;
     let mut goes_on = true;
     while let Some(event) = transport.event() {
         match event {
@@ -115,8 +110,11 @@ fn transported(
                 told.transported += 1;
                 let (pgn, da, sa) = (message.pgn, message.da, message.sa);
                 let id = Id::new(PRIORITY, pgn, da, sa)
-                    .or_else(|_| Id::new(PRIORITY, pgn, GLOBAL_ADDRESS, sa))
-                    .map_err(Failure::work)?;
+                    .or_else(|_| Id::new(PRIORITY, pgn, GLOBAL_ADDRESS, sa));
+                let Ok(id) = id else {
+                    told.broken += 1;
+                    continue;
+                };
                 let (time, bytes) = (message.time, message.bytes);
                 goes_on &= hear(&Heard { time, id, da, bytes, ..*from })?;
             }
