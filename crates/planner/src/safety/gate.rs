@@ -24,7 +24,7 @@
 
 use super::rss::{RssConfig, SafeGap};
 use super::surroundings::{EgoExtent, in_lane, reaches};
-use crate::steering::LateralPath;
+use crate::steering::{Lateral, LateralPath};
 use driver_models::ballistic;
 use road::Road;
 use tractrix_core::{EgoState, LaneChangeRefusal, Neighbour, Scene, VehicleClass, VehicleLimits};
@@ -276,13 +276,15 @@ impl Gate {
         }
         let down_to_m_s = course.start_m_s.min(course.end_m_s);
         let (mut entry_s, mut time_s) = (None, 0.0);
+        let mut here = path.at(road, s_m + course.at(time_s).1);
         while time_s <= course.duration_s + self.reaction_s {
             let (v, travelled) = course.at(time_s);
-            let d_m = path.at(road, s_m + travelled).d_m;
-            if entry_s.is_none() && self.enters(road, path, s_m, course.at(time_s + STEP_S).1) {
+            let d_m = here.d_m;
+            let next_s_m = s_m + course.at(time_s + STEP_S).1;
+            here = path.at(road, next_s_m);
+            if entry_s.is_none() && self.enters(road, path.lane, (next_s_m, &here), s_m) {
                 entry_s = Some(time_s);
             }
-            // The body is in the lane within a step of the entry that counts for the gaps.
             let to_indicator = strictness.yield_to_indicator;
             let entered_s = entry_s.filter(|_| !to_indicator).map(|entry_s| entry_s + STEP_S);
             let (seen_s, decel_m_s2) = (entered_s.unwrap_or(0.0), strictness.yield_decel_m_s2);
@@ -297,12 +299,11 @@ impl Gate {
         Ok(())
     }
 
-    /// Whether the tractor reaches into the lane that a path leads to once it has `travelled` from
-    /// `s_m`.
-    fn enters(&self, road: &Road, path: &LateralPath, s_m: f64, travelled: f64) -> bool {
-        road.lanes().get(usize::from(path.lane)).is_none_or(|track| {
-            let at_m = s_m + travelled;
-            let (at, centre_m) = (path.at(road, at_m), track.center_d_m(at_m));
+    /// Whether the tractor reaches into a lane from where it is `at` a station; `s_m` is its station
+    /// now.
+    fn enters(&self, road: &Road, lane: u16, (at_m, at): (f64, &Lateral), s_m: f64) -> bool {
+        road.lanes().get(usize::from(lane)).is_none_or(|track| {
+            let centre_m = track.center_d_m(at_m);
             let front_d_m = at.d_m + at.slope * (self.extent.front_s_m - s_m);
             let reach_m = 0.5 * (track.width_m(at_m) + self.extent.width_m);
             (centre_m - at.d_m).abs().min((centre_m - front_d_m).abs()) < reach_m

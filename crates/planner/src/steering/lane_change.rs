@@ -6,7 +6,7 @@
 //! `RA |v² k - g bank| / a_rollover` below its bound (`RA`: rearward amplification), and the corners
 //! of tractor and trailer inside the two lanes. The trailer follows by the paper's Eq. 1.
 
-use super::path::{Lateral, LateralPath, direction, lane_centre};
+use super::path::{Lateral, LateralPath, Quintic, direction, lane_centre, off_centre};
 use crate::error::config_in;
 use crate::safety::{Gate, SpeedCourse, Strictness};
 use crate::{LaneChoice, PlannerError};
@@ -215,13 +215,15 @@ pub fn plan_change(
     }
     let room_m = start.lane_ends_in_m.unwrap_or(f64::INFINITY);
     let mut refusal = None;
+    let from = beginning(start, target);
     let corridor = Corridor::new(start.road, start.path.lane, target);
     for course in courses.cheapest_first() {
         let length_m = course.at(course.duration_s).1;
         if length_m > room_m {
             continue;
         }
-        let path = continued(start, target, length_m);
+        let offset = Quintic::to_zero(from, start.ego.s_m, length_m);
+        let path = LateralPath { lane: target, offset: Some(offset) };
         // The gate first: it usually answers within its first instant
         if let Err(reason) = gate.check(&course, &path, start.road, start.ego.s_m, &strictness) {
             refusal.get_or_insert(reason);
@@ -243,10 +245,12 @@ pub(super) fn plan_abort(config: &LaneChangeConfig, start: &Start<'_>, own: u16)
     let corridor = Corridor::new(start.road, own, start.path.lane);
     let f = config.abort_factor;
     let limits = (f * config.lateral_accel_max_m_s2, f * config.lateral_jerk_max_m_s3);
+    let from = beginning(start, own);
     let mut duration_s = 3.0;
     loop {
         let course = SpeedCourse { start_m_s: v, end_m_s: v, duration_s };
-        let path = continued(start, own, v * duration_s);
+        let offset = Quintic::to_zero(from, start.ego.s_m, v * duration_s);
+        let path = LateralPath { lane: own, offset: Some(offset) };
         if duration_s >= config.duration_max_s
             || drivable(config, start, &path, &course, &corridor, limits)
         {
@@ -318,15 +322,15 @@ pub(super) fn pulling_away(v: f64, length_m: f64) -> SpeedCourse {
     SpeedCourse { start_m_s: v, end_m_s: end, duration_s: (end - v) / PULL_AWAY_M_S2 }
 }
 
-/// The path that leaves the present one without a jump and is on `lane`'s centre after `length_m`.
-fn continued(start: &Start<'_>, lane: u16, length_m: f64) -> LateralPath {
+/// Where the paths to `lane` begin that leave the present one without a jump, relative to its centre.
+fn beginning(start: &Start<'_>, lane: u16) -> Lateral {
     let s_m = start.ego.s_m;
     let mut from = start.path.at(start.road, s_m);
     if start.ego.speed_m_s < STANDS_M_S {
         // Who stands turns the wheels as they must be.
         from.second_1_m = 0.0;
     }
-    LateralPath::join(start.road, lane, from, s_m, length_m)
+    off_centre(start.road, lane, from, s_m)
 }
 
 /// The outer edges of two lanes.

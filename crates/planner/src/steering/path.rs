@@ -115,6 +115,17 @@ pub(super) fn lane_centre(road: &Road, lane: u16, s_m: f64) -> Lateral {
     }
 }
 
+/// A lateral state at a station relative to a lane's centre.
+#[must_use]
+pub(super) fn off_centre(road: &Road, lane: u16, start: Lateral, s_m: f64) -> Lateral {
+    let centre = lane_centre(road, lane, s_m);
+    Lateral {
+        d_m: start.d_m - centre.d_m,
+        slope: start.slope - centre.slope,
+        second_1_m: start.second_1_m - centre.second_1_m,
+    }
+}
+
 impl LateralPath {
     /// The lane's centre.
     #[must_use]
@@ -125,12 +136,7 @@ impl LateralPath {
     /// A path that leaves from `start` at `s_m` and is on the lane's centre after `length_m`.
     #[must_use]
     pub fn join(road: &Road, lane: u16, start: Lateral, s_m: f64, length_m: f64) -> Self {
-        let centre = lane_centre(road, lane, s_m);
-        let relative = Lateral {
-            d_m: start.d_m - centre.d_m,
-            slope: start.slope - centre.slope,
-            second_1_m: start.second_1_m - centre.second_1_m,
-        };
+        let relative = off_centre(road, lane, start, s_m);
         Self { lane, offset: Some(Quintic::to_zero(relative, s_m, length_m)) }
     }
 
