@@ -7,6 +7,7 @@ use nalgebra::DVector;
 use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S};
 
 use crate::Drive;
+use crate::course::Course;
 use crate::problem::Problem;
 use crate::refit::{Fit, directions, prior};
 use crate::replay::{Module, Prepared};
@@ -106,8 +107,14 @@ impl Problem<'_> {
             };
             FORMS.iter().map(column).collect()
         };
-        let along = directions(&fit.free, &fit.theta);
-        let (a, b, _) = self.gram_beside(&fit.theta, &along, m, &columns).sum(|_| true);
+        let mut along = directions(&fit.free, &fit.theta);
+        let course = Course::of(&fit.sizes(), &mut along);
+        let hats = fit.free.len() + 1..along.len() + 1;
+        let gram = self.gram_beside(&fit.theta, &along, m, &columns);
+        let keep: Vec<usize> =
+            (0..=along.len() + FORMS.len()).filter(|j| !hats.contains(j)).collect();
+        let gram = course.taken_out(&gram, &keep, &fit.theta, &self.reference.theta)?;
+        let (a, b, _) = gram.total();
         // The residual at no effect in the linear model, as in the screen.
         let (k, zero) = (fit.free.len(), &self.reference.theta);
         let shift = DVector::from_fn(b.len(), |i, _| {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::course::Point;
 use crate::detectable::detectable;
 use crate::drive_use::{DriveRole, DriveUse, drive_uses};
 use crate::gain::{DriveError, HORIZON_S, drive_error, rms};
@@ -152,7 +153,7 @@ pub fn diagnose_with(
         None => (Problem::learn(plant, prepare(&learn), false, executor)?, &[] as &[DriveError]),
     };
     let (open, not_observable, detectable) = observable(&problem, options);
-    let bare = beyond(&problem, &problem.reference.theta);
+    let bare = beyond(&problem, &Point::bare(problem.reference.theta));
     let most = bare.first().map_or(0.0, |s| s.log_z);
     let fitted = problem.evidence().search(&open, options.max_causes, most, &mut |found| {
         progress(Progress::Search { found });
@@ -316,9 +317,7 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
         let mut confused_with: Vec<Confusion> = Vec::new();
         let mut rivalled = false;
         if let Some(f) = &without {
-            let needed = evidence.threshold(f, fit).max(MIN_EVIDENCE);
-            let counts = lost_nats * MIN_EVIDENCE / needed;
-            models.push(model(ids(&fewer), fit.log_z - counts));
+            models.push(model(ids(&fewer), fit.log_z - lost_nats));
             let rest: Vec<usize> = open
                 .iter()
                 .copied()
@@ -356,8 +355,7 @@ fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<
             if hyp.params().any(|q| q == *p) {
                 let s = p.spec();
                 let x = fit.theta[*p as usize] - zero[*p as usize];
-                let form = if hyp.sizes.contains(p) { 0.015 * x.abs() } else { 0.0 };
-                let sigma = (variances[j] + form * form).sqrt();
+                let sigma = variances[j].sqrt();
                 let value = if s.is_factor() { 1.0 + x } else { x };
                 parameters.insert(s.key, Parameter { value, sigma, unit: s.unit });
             }

@@ -7,7 +7,6 @@ pub(crate) mod linear;
 
 use crate::param::Theta;
 use crate::problem::{Direction, Gram, Problem};
-use crate::replay::MODULES;
 
 /// Drives seen through their tolerances. Search, fit, screen and gates speak to this alone.
 pub(crate) trait Evidence {
@@ -17,20 +16,11 @@ pub(crate) trait Evidence {
     /// How many drives there are.
     fn drives(&self) -> usize;
 
-    /// Gram matrix of the residual at `theta` and the directions from `from`, and the squared
-    /// whitened residual per module, tolerances included.
-    fn gram_along(
-        &self,
-        theta: &Theta,
-        from: &Theta,
-        directions: &[Direction],
-    ) -> (Gram, [f64; MODULES]);
-
-    /// The squared whitened residual per module at [`Evidence::zero`].
-    fn chi_at_zero(&self) -> [f64; MODULES];
+    /// Gram matrix of the residual at `theta` and the directions from `from`.
+    fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram;
 
     /// The Gram matrix with residual and directions at the same point.
-    fn gram(&self, theta: &Theta, directions: &[Direction]) -> (Gram, [f64; MODULES]) {
+    fn gram(&self, theta: &Theta, directions: &[Direction]) -> Gram {
         self.gram_along(theta, theta, directions)
     }
 }
@@ -44,17 +34,8 @@ impl Evidence for Problem<'_> {
         self.drives.len()
     }
 
-    fn gram_along(
-        &self,
-        theta: &Theta,
-        from: &Theta,
-        directions: &[Direction],
-    ) -> (Gram, [f64; MODULES]) {
+    fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram {
         Problem::gram_along(self, theta, from, directions)
-    }
-
-    fn chi_at_zero(&self) -> [f64; MODULES] {
-        self.chi_at_reference()
     }
 }
 

@@ -105,11 +105,11 @@ impl dyn Evidence + '_ {
             for start in h.starts {
                 let shape = h.shapes.iter().copied().zip(*start).collect();
                 let p = h.sizes[0];
-                dirs.push(Direction { p, shape, step: p.spec().step });
+                dirs.push(Direction::new(p, shape, p.spec().step));
                 owner.push(i);
             }
         }
-        let (gram, _) = self.gram(self.zero(), &dirs);
+        let gram = self.gram(self.zero(), &dirs);
         let (a, _, _) = gram.sum(|_| true);
         let mut out = vec![0.0_f64; CATALOGUE.len()];
         for (j, i) in owner.iter().enumerate() {

@@ -10,7 +10,7 @@ const AGAINST: f64 = 3.0;
 
 /// Score of every drive at `theta`, nats: the whitened residual that its tolerances cannot take.
 fn scores(held: &dyn Evidence, theta: &Theta) -> Vec<f64> {
-    let (gram, _) = held.gram(theta, &[]);
+    let gram = held.gram(theta, &[]);
     gram.per_drive.iter().map(|g| -0.5 * g[(0, 0)]).collect()
 }
 

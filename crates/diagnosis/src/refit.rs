@@ -2,11 +2,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::course::Course;
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, Theta};
 use crate::problem::{Direction, Gram};
-use crate::replay::MODULES;
 use crate::stats::evidence;
 
 /// Part of the improvement that a step promises by which it may miss before the sensitivities are
@@ -37,8 +37,13 @@ pub(crate) struct Fit {
     pub(crate) gram: Gram,
     /// Residual norm at the fit.
     pub(crate) norm: f64,
-    /// Half the fall of the squared residual per module, nats.
-    pub(crate) explained: [f64; MODULES],
+}
+
+impl Fit {
+    /// Sizes of the causes.
+    pub(crate) fn sizes(&self) -> Vec<P> {
+        self.set.iter().flat_map(|h| CATALOGUE[*h].sizes).copied().collect()
+    }
 }
 
 pub(crate) fn directions(free: &[P], theta: &Theta) -> Vec<Direction> {
@@ -46,7 +51,7 @@ pub(crate) fn directions(free: &[P], theta: &Theta) -> Vec<Direction> {
         .map(|p| {
             let s = p.spec();
             let up = theta[*p as usize] + s.step <= s.hi;
-            Direction { p: *p, shape: Vec::new(), step: if up { s.step } else { -s.step } }
+            Direction::new(*p, Vec::new(), if up { s.step } else { -s.step })
         })
         .collect()
 }
@@ -90,6 +95,8 @@ struct Normal {
 struct Free {
     params: Vec<P>,
     priors: Vec<Prior>,
+    /// Those of them that are sizes of causes: these have a course.
+    sizes: Vec<P>,
     /// Those of them that are shapes: they move by a few secant steps at once.
     shapes: Vec<P>,
     /// Places of those of the member that came last, if others were there before.
@@ -109,17 +116,19 @@ impl Free {
             _ => Vec::new(),
         };
         let shapes = set.iter().flat_map(|h| CATALOGUE[*h].shapes).copied().collect();
+        let sizes = set.iter().flat_map(|h| CATALOGUE[*h].sizes).copied().collect();
         let priors = params
             .iter()
             .map(|p| Prior { mean: zero[*p as usize], sigma: p.spec().prior })
             .collect();
-        Self { priors, params, shapes, newest, zero }
+        Self { priors, params, sizes, shapes, newest, zero }
     }
 
     /// Figures rather than causes, each with a prior of its own.
     fn figures(figures: &[(P, Prior)], zero: Theta) -> Self {
         let (params, priors) = figures.iter().copied().unzip();
-        Self { params, priors, shapes: Vec::new(), newest: Vec::new(), zero }
+        let (sizes, shapes, newest) = Default::default();
+        Self { params, priors, sizes, shapes, newest, zero }
     }
 
     /// Squared residual and prior.
@@ -128,8 +137,15 @@ impl Free {
         norm + priors.map(|(p, q)| ((theta[*p as usize] - q.mean) / q.sigma).powi(2)).sum::<f64>()
     }
 
+    /// The directions of the parameters from a point, and of the courses of the sizes.
+    fn along(&self, theta: &Theta) -> Along {
+        let mut directions = directions(&self.params, theta);
+        let course = Course::of(&self.sizes, &mut directions);
+        Along { from: *theta, directions, course }
+    }
+
     fn normal(&self, gram: &Gram, theta: &Theta) -> Normal {
-        let (mut a, mut b, _) = gram.sum(|_| true);
+        let (mut a, mut b, _) = gram.total();
         for (j, (p, q)) in self.params.iter().zip(&self.priors).enumerate() {
             a[(j, j)] += 1.0 / (q.sigma * q.sigma);
             b[j] -= q.pull(theta[*p as usize]);
@@ -159,16 +175,20 @@ impl Free {
     }
 }
 
+/// Where and along what sensitivities were taken: they serve as long as steps do what they promise.
+struct Along {
+    from: Theta,
+    directions: Vec<Direction>,
+    course: Course,
+}
+
 /// Where a fit stands.
 struct Standing {
     theta: Theta,
+    /// In the metric of the courses at `theta`.
     cost: f64,
     gram: Gram,
-    chi: [f64; MODULES],
-    /// Where and along what the sensitivities were taken: they serve as long as steps do what they
-    /// promise.
-    from: Theta,
-    along: Vec<Direction>,
+    along: Along,
 }
 
 impl dyn Evidence + '_ {
@@ -180,24 +200,38 @@ impl dyn Evidence + '_ {
     /// Fits figures with priors of their own from where nothing is off.
     pub(crate) fn fit_figures(&self, figures: &[(P, Prior)]) -> Option<Fit> {
         let zero = *self.zero();
-        let norm = self.gram(&zero, &[]).0.sum(|_| true).2;
+        let norm = self.gram(&zero, &[]).sum(|_| true).2;
         self.fit_free(&[], Free::figures(figures, zero), &zero, norm)
     }
 
     fn fit_free(&self, set: &[usize], free: Free, start: &Theta, zero_norm: f64) -> Option<Fit> {
-        let along = directions(&free.params, start);
-        let (gram, chi) = self.gram(start, &along);
-        let began = free.cost(gram.sum(|_| true).2, start);
-        let mut at = Standing { theta: *start, cost: began, gram, chi, from: *start, along };
+        let mut at = self.stand(&free, start, free.along(start))?;
+        let mut improved = 0.0;
         let most = if free.params.is_empty() { 0 } else { MOST_STEPS };
         for _ in 0..most {
             let Some(step) = self.best_step(&free, &at)? else { break };
-            self.advance(&free, &mut at, &step);
-            if step.improved < 0.3 + 1e-5 * (began - at.cost) {
+            let kept = (step.improved - step.promised).abs() <= KEPT_PROMISE * step.promised;
+            let along = if kept { at.along } else { free.along(&step.to) };
+            at = self.stand(&free, &step.to, along)?;
+            improved += step.improved;
+            if step.improved < 0.3 + 1e-5 * improved {
                 break;
             }
         }
         self.fitted(set, free, at, zero_norm)
+    }
+
+    /// Gram matrix over residual and parameters, the courses of sizes of `at` taken out.
+    fn seen(&self, free: &Free, theta: &Theta, along: &Along, at: &Theta) -> Option<Gram> {
+        let gram = self.gram_along(theta, &along.from, &along.directions);
+        let keep: Vec<usize> = (0..=free.params.len()).collect();
+        along.course.taken_out(&gram, &keep, at, &free.zero)
+    }
+
+    fn stand(&self, free: &Free, theta: &Theta, along: Along) -> Option<Standing> {
+        let gram = self.seen(free, theta, &along, theta)?;
+        let cost = free.cost(gram.total().2, theta);
+        Some(Standing { theta: *theta, cost, gram, along })
     }
 
     /// The common step with halving, or the newest member's alone where that leads further; none
@@ -206,7 +240,9 @@ impl dyn Evidence + '_ {
         let Normal { a, b } = free.normal(&at.gram, &at.theta);
         let tried = |step: &DVector<f64>, factor: f64| {
             let to = free.moved(&at.theta, step, factor);
-            let cost = free.cost(self.gram(&to, &[]).0.sum(|_| true).2, &to);
+            // Both ends of a step are compared in the metric of its beginning.
+            let gram = self.seen(free, &to, &at.along, &at.theta);
+            let cost = gram.map_or(f64::INFINITY, |g| free.cost(g.total().2, &to));
             let curve = (&a * step).dot(step);
             let promised = 2.0 * factor * b.dot(step) - factor * factor * curve;
             Step { to, improved: at.cost - cost, promised }
@@ -230,19 +266,9 @@ impl dyn Evidence + '_ {
         Some(found)
     }
 
-    /// Takes a step; sensitivities are taken anew where it did not do what it promised.
-    fn advance(&self, free: &Free, at: &mut Standing, step: &Step) {
-        at.theta = step.to;
-        at.cost -= step.improved;
-        if (step.improved - step.promised).abs() > KEPT_PROMISE * step.promised {
-            (at.from, at.along) = (at.theta, directions(&free.params, &at.theta));
-        }
-        (at.gram, at.chi) = self.gram_along(&at.theta, &at.from, &at.along);
-    }
-
     /// Evidence and covariance where a fit has ended (Laplace).
     fn fitted(&self, set: &[usize], free: Free, at: Standing, zero_norm: f64) -> Option<Fit> {
-        let (a, _, norm) = at.gram.sum(|_| true);
+        let (a, _, norm) = at.gram.total();
         let k = free.params.len();
         let sigma: Vec<f64> = free.priors.iter().map(|p| p.sigma).collect();
         let scaled = DMatrix::from_fn(k, k, |i, j| {
@@ -252,7 +278,6 @@ impl dyn Evidence + '_ {
         let log_det: f64 = 2.0 * (0..k).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
         let inverse = chol.inverse();
         let covariance = DMatrix::from_fn(k, k, |i, j| sigma[i] * inverse[(i, j)] * sigma[j]);
-        let zero = self.chi_at_zero();
         Some(Fit {
             set: set.to_vec(),
             theta: at.theta,
@@ -262,7 +287,6 @@ impl dyn Evidence + '_ {
             covariance,
             gram: at.gram,
             norm,
-            explained: core::array::from_fn(|m| 0.5 * (zero[m] - at.chi[m])),
         })
     }
 }

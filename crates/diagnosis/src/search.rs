@@ -3,9 +3,8 @@
 //! At every step all hypotheses outside the set are screened with the set's parameters free
 //! (secant sensitivities at the fitted point, one Gram matrix), the best are refitted by
 //! Gauss-Newton, and the best refit is taken if it beats the threshold: six nats for the first
-//! cause, ten for a further one, or three thousandths of what was already explained in the same
-//! modules, whichever is more. The relative rule stops helpers that patch the model-form error of a
-//! large effect.
+//! cause, ten for a further one. What a helper would patch of the form of a large cause is in the
+//! score already ([`crate::course`]).
 
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
@@ -18,8 +17,6 @@ use crate::screen::{Candidate, Screen, outside};
 const MIN_FIRST: f64 = 6.0;
 /// Least evidence for another cause, and for a first one that has a rival, nats.
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
-/// Part of the evidence already found in the same modules that another cause must add.
-const RELATIVE_EVIDENCE: f64 = 0.003;
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
 /// Evidence of a free function over that of causes above which these are searched no further.
@@ -38,14 +35,14 @@ impl dyn Evidence + '_ {
         progress: &mut dyn FnMut(usize),
     ) -> Option<(Fit, Fit)> {
         let zero = *self.zero();
-        let (g, _) = self.gram(&zero, &[]);
+        let g = self.gram(&zero, &[]);
         let zero_norm = g.sum(|_| true).2;
         let empty = self.fit(&[], &zero, zero_norm)?;
         let mut best = empty.clone();
         while best.set.len() < max_causes {
             progress(best.set.len());
             let Some(next) = self.step(&best, open, zero_norm) else { break };
-            if next.log_z - best.log_z < self.threshold(&best, &next) {
+            if next.log_z - best.log_z < Self::threshold(&best) {
                 break;
             }
             best = next;
@@ -83,11 +80,7 @@ impl dyn Evidence + '_ {
             };
             let Some(one) = self.with_added(&there, &pair[0], zero_norm) else { continue };
             let Some(both) = self.with_added(&one, &pair[1], zero_norm) else { continue };
-            let needed = if both.set.len() > best.set.len() {
-                self.threshold(&one, &both).max(self.threshold(best, &both))
-            } else {
-                1.0
-            };
+            let needed = if both.set.len() > best.set.len() { MIN_EVIDENCE } else { 1.0 };
             if both.log_z > best.log_z + needed
                 && winner.as_ref().is_none_or(|w| both.log_z > w.log_z)
             {
@@ -97,29 +90,9 @@ impl dyn Evidence + '_ {
         winner
     }
 
-    /// What `next` must add to `best`. What is added in modules of which much is explained may patch
-    /// the form of a larger cause; the part that falls on other modules does not.
-    pub(crate) fn threshold(&self, best: &Fit, next: &Fit) -> f64 {
-        let Some(added) = next.set.iter().find(|h| !best.set.contains(h)) else {
-            return f64::INFINITY;
-        };
-        if best.set.is_empty() {
-            return MIN_FIRST;
-        }
-        let groups = CATALOGUE[*added].groups();
-        let (mut there, mut adds, mut adds_apart) = (0.0, 0.0, 0.0);
-        for m in groups.iter().flat_map(|g| g.modules()).map(|m| *m as usize) {
-            let added = (next.explained[m] - best.explained[m]).max(0.0);
-            there += best.explained[m].max(0.0);
-            adds += added;
-            if RELATIVE_EVIDENCE * best.explained[m] < MIN_EVIDENCE {
-                adds_apart += added;
-            }
-        }
-        // What the tolerances would have taken anyway was not explained by the set.
-        let relative = RELATIVE_EVIDENCE * f64::min(there, best.log_z);
-        let apart = MIN_EVIDENCE * adds / f64::max(adds_apart, f64::MIN_POSITIVE);
-        MIN_EVIDENCE.max(relative.min(apart))
+    /// What another cause must add to `best`, nats.
+    pub(crate) fn threshold(best: &Fit) -> f64 {
+        if best.set.is_empty() { MIN_FIRST } else { MIN_EVIDENCE }
     }
 
     fn step(&self, best: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
@@ -190,7 +163,7 @@ impl dyn Evidence + '_ {
                     i += 1;
                     continue;
                 };
-                if best.log_z - f.log_z < self.threshold(&f, &best) {
+                if best.log_z - f.log_z < Self::threshold(&f) {
                     (best, screen) = (f, None);
                     changed = true;
                     continue;

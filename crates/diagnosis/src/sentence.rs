@@ -3,7 +3,7 @@
 use crate::identify::SIGMAS_90;
 use crate::problem::Problem;
 use crate::replay::{Module, Prepared};
-use crate::unknown::Shape;
+use crate::unknown::{Acts, Shape};
 
 /// The sentence of a cause of size `x`.
 pub(crate) fn cause(id: &str, x: f64) -> String {
@@ -176,21 +176,33 @@ pub(crate) fn shape(s: &Shape) -> String {
         .copied()
         .unwrap_or((0.0, 0.0));
     let word = if extreme.1 >= 0.0 { "a rise" } else { "a dip" };
-    if s.factor {
-        return format!(
-            "{} off by a factor: {word} of {:.1} % near {} = {:.4}",
-            s.module.quantity(),
-            100.0 * extreme.1.abs(),
-            s.signal,
-            extreme.0
-        );
+    let signal = match s.memory_s {
+        0.0 => s.signal.to_owned(),
+        memory_s => format!("{} over the last {:.0} min", s.signal, memory_s / 60.0),
+    };
+    let percent = 100.0 * extreme.1.abs();
+    match s.acts {
+        Acts::Added => {}
+        Acts::Scaled => {
+            let what = s.module.quantity();
+            return format!(
+                "{what} off by a factor: {word} of {percent:.1} % near {signal} = {:.4}",
+                extreme.0
+            );
+        }
+        Acts::Part(what) => {
+            return format!(
+                "{what} off by a factor that follows {signal}: {word} of {percent:.1} % near {:.4}",
+                extreme.0
+            );
+        }
     }
     // the force balance is one of accelerations
     let (size, what) = match s.module {
         Module::Force => (format!("{:.3} m/s²", extreme.1.abs()), "force"),
         m => (format!("{:.3}", extreme.1.abs()), m.quantity()),
     };
-    format!("{word} of {size} in the {what} balance near {} = {:.4}", s.signal, extreme.0)
+    format!("{word} of {size} in the {what} balance near {signal} = {:.4}", extreme.0)
 }
 
 /// Where the residuals of a module are largest: the worst bin over speed, grade and time.

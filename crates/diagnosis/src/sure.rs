@@ -3,20 +3,16 @@
 
 use crate::Unknown;
 use crate::catch_all::Left;
+use crate::course::Point;
 use crate::hypothesis::CATALOGUE;
-use crate::param::Theta;
 use crate::problem::Problem;
 use crate::refit::Fit;
 use crate::replay::Module;
 use crate::sentence;
-use crate::unknown::{Restless, Shape};
+use crate::unknown::{Acts, Restless, Shape};
 
 /// Evidence that a free function needs beside or instead of named causes, nats.
 const UNKNOWN_EVIDENCE: f64 = 30.0;
-
-/// Part of the causes' evidence that a free function may add before the causes are not sure: a
-/// substitute for a cause that the catalogue lacks leaves more.
-const LEFT_OVER: f64 = 0.08;
 
 /// Part of the evidence of one cause, and of several in the same module, above which a free function
 /// replaces them if they leave much over.
@@ -34,10 +30,6 @@ const ACCOUNTED: f64 = 0.2;
 /// Variance over that of drives in order, in a module that a cause explains, above which the cause
 /// is not sure.
 const MISFIT: f64 = 1.2;
-
-/// Part of the variance that causes take from a module, beyond that of drives in order, below which
-/// what they leave is of their form.
-const FORM: f64 = 0.12;
 
 /// Evidence, and part of the causes' evidence, that a force without a name may add before causes of
 /// the force balance are not sure.
@@ -97,13 +89,13 @@ fn against_functions(
     bare: &[Shape],
 ) -> (Fit, Option<Unknown>, Sure) {
     let best_bare = bare.first().map_or(0.0, |s| s.log_z);
-    if let Some(random) = problem.restless(&empty.theta)
+    if let Some(random) = problem.restless(&Point::of(empty))
         && random.evidence > best_bare.max(1.15 * fit.log_z)
         && bare.first().is_none_or(|s| s.module != random.module || s.explained_frac < FOLLOWS)
     {
         return (empty.clone(), Some(noise(&random)), Sure::Outside);
     }
-    let rest = if fit.set.is_empty() { bare.to_vec() } else { beyond(problem, &fit.theta) };
+    let rest = if fit.set.is_empty() { bare.to_vec() } else { beyond(problem, &Point::of(&fit)) };
     let left = rest.first().map_or(0.0, |s| s.firm);
     if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
         let best_rest = rest.first().map_or(0.0, |s| s.log_z);
@@ -115,7 +107,7 @@ fn against_functions(
             return (elsewhere(problem, empty, &fit, bare), describe(bare), Sure::Outside);
         }
     }
-    if left > UNKNOWN_EVIDENCE.max(LEFT_OVER * fit.log_z) {
+    if left > UNKNOWN_EVIDENCE {
         let share = rest.first().map_or(0, |s| sharing(&fit, s.module));
         // Causes that leave much and that one free function replaces stand in for it.
         let replaced = if share > 1 { REPLACED_MANY } else { REPLACED_ONE };
@@ -129,7 +121,7 @@ fn against_functions(
         };
         return (fit, describe(&rest), sure);
     }
-    if let Some(random) = problem.restless(&fit.theta).filter(|r| !form(problem, &fit, r.module)) {
+    if let Some(random) = problem.restless(&Point::of(&fit)) {
         if fit.set.is_empty() || random.evidence > fit.log_z {
             return (empty.clone(), Some(noise(&random)), Sure::Outside);
         }
@@ -161,9 +153,9 @@ fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fi
     if left.log_z > UNKNOWN_EVIDENCE { left } else { empty.clone() }
 }
 
-/// Free functions of what is left at `theta`, beyond those that drives in order have too, best first.
-pub(crate) fn beyond(problem: &Problem<'_>, theta: &Theta) -> Vec<Shape> {
-    let mut shapes = problem.shapes(theta);
+/// Free functions of what is left at a point, beyond those that drives in order have too, best first.
+pub(crate) fn beyond(problem: &Problem<'_>, at: &Point) -> Vec<Shape> {
+    let mut shapes = problem.shapes(at);
     let drives = problem.drives.len() as f64;
     for s in &mut shapes {
         let usual = problem.reference.free_form[s.module as usize].max(0.0);
@@ -185,25 +177,15 @@ fn sharing(fit: &Fit, module: Module) -> usize {
     fit.set.iter().filter(|h| shows(**h, module)).count()
 }
 
-/// What the causes leave in a module that they explain is small against what they explain: the
-/// course of a cause in this truck differs from that of the catalogue.
-fn form(problem: &Problem<'_>, fit: &Fit, module: Module) -> bool {
-    let excess = |theta| {
-        let usual = problem.reference.settled[module as usize].max(1.0);
-        problem.settled(theta)[module as usize] / usual - 1.0
-    };
-    sharing(fit, module) > 0 && excess(&fit.theta) < FORM * excess(&problem.reference.theta)
-}
-
 /// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
 /// module, a module that they explain keeps more variance than drives in order have, or a figure
 /// has run to its bound.
 fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
-    let now = problem.settled(&fit.theta);
+    let now = problem.settled(&Point::of(fit));
     let strained = Module::ALL.into_iter().any(|m| {
         let share = sharing(fit, m);
         let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
-        share >= 3 || (share > 0 && excess > MISFIT && !form(problem, fit, m))
+        share >= 3 || (share > 0 && excess > MISFIT)
     });
     let zero = &problem.reference.theta;
     strained || fit.set.iter().any(|h| CATALOGUE[*h].is_at_bound(&fit.theta, zero))
@@ -224,6 +206,8 @@ fn describe(shapes: &[Shape]) -> Option<Unknown> {
         explained_frac: best.explained_frac,
         evidence: best.log_z,
         table: best.knots.clone(),
+        is_factor: best.acts != Acts::Added,
+        memory_s: best.memory_s,
     })
 }
 
@@ -236,6 +220,8 @@ fn resembling(left: &Left) -> Unknown {
         explained_frac: 0.0,
         evidence: left.evidence,
         table: Vec::new(),
+        is_factor: false,
+        memory_s: 0.0,
     }
 }
 
@@ -254,5 +240,7 @@ fn noise(random: &Restless) -> Unknown {
         explained_frac: 0.0,
         evidence: random.evidence,
         table: Vec::new(),
+        is_factor: false,
+        memory_s: 0.0,
     }
 }

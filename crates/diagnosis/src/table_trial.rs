@@ -87,6 +87,9 @@ fn table(unknown: &Unknown, origin: &str) -> Result<TableEffect, String> {
             unknown.quantity
         ));
     }
+    if unknown.is_factor || unknown.memory_s > 0.0 {
+        return Err(format!("only what is added over a signal can be a table; {}", unknown.shape));
+    }
     let name = unknown.signals.first().copied().unwrap_or("no signal");
     let signal = TableSignal::of(name)
         .ok_or_else(|| format!("the truck model has no state {name} that a table could follow"))?;
@@ -128,6 +131,8 @@ mod tests {
             explained_frac: 0.5,
             evidence: 50.0,
             table: vec![(900.0, 0.0), (1200.0, -0.02), (1500.0, 0.0)],
+            is_factor: false,
+            memory_s: 0.0,
         }
     }
 
@@ -140,5 +145,9 @@ mod tests {
         assert!(table(&unknown("speed_m_s", "time_s"), "d").unwrap_err().contains("time_s"));
         let error = table(&unknown("fuel_rate_g_s", "engine_speed_rpm"), "d").unwrap_err();
         assert!(error.contains("fuel_rate_g_s"), "{error}");
+        let factor = Unknown { is_factor: true, ..unknown("speed_m_s", "engine_speed_rpm") };
+        assert!(table(&factor, "d").unwrap_err().contains("added"));
+        let memory = Unknown { memory_s: 300.0, ..unknown("speed_m_s", "engine_speed_rpm") };
+        assert!(table(&memory, "d").unwrap_err().contains("added"));
     }
 }

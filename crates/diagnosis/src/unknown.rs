@@ -5,10 +5,10 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::drive::Drive;
-use crate::param::Theta;
+use crate::course::Point;
 use crate::problem::{Problem, Rest};
 use crate::replay::{Module, Prepared};
+use crate::signal::{SIGNALS, Signal, means};
 use crate::stats::evidence;
 
 /// Knots of the spline.
@@ -21,8 +21,10 @@ const LENGTH: f64 = 0.3;
 pub(crate) struct Shape {
     pub(crate) module: Module,
     pub(crate) signal: &'static str,
-    /// A factor on the module's own quantity rather than an addition to it.
-    pub(crate) factor: bool,
+    /// Time constant of the signal's memory, s; 0: none.
+    pub(crate) memory_s: f64,
+    /// An addition to the module's quantity, a factor on it, or on a part of the balance.
+    pub(crate) acts: Acts,
     /// Evidence over the present model, nats.
     pub(crate) log_z: f64,
     /// The same as far as the drives agree about it.
@@ -31,6 +33,17 @@ pub(crate) struct Shape {
     pub(crate) knots: Vec<(f64, f64)>,
     /// Part of the module's explainable excess that it takes.
     pub(crate) explained_frac: f64,
+}
+
+/// What a free function does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Acts {
+    /// It is added.
+    Added,
+    /// It is a factor on the module's own quantity.
+    Scaled,
+    /// It is a factor on a part of the balance, in words.
+    Part(&'static str),
 }
 
 /// A disturbance that follows no signal.
@@ -43,30 +56,6 @@ pub(crate) struct Restless {
     /// Evidence, nats.
     pub(crate) evidence: f64,
 }
-
-type Read = fn(&Prepared, usize) -> f64;
-
-const SIGNALS: &[(&str, Read)] = &[
-    ("engine_speed_rpm", |d, i| d.rpm[i]),
-    ("speed_m_s", |d, i| d.speed[i]),
-    ("curvature_1_m", |d, i| d.curvature[i].abs()),
-    ("grade_frac", |d, i| d.grade[i]),
-    ("time_s", |_, i| i as f64 * Drive::STEP_S),
-    ("ambient_temp_degc", |d, i| d.ambient[i]),
-    ("coolant_temp_degc", |d, i| d.coolant[i]),
-    ("accelerator_pedal_frac", |d, i| d.pedal[i]),
-    ("brake_pressure_kpa", |d, i| d.pressure[i]),
-    ("gps_altitude_m", |d, i| d.altitude[i]),
-    ("gear", |d, i| d.gear[i] as f64),
-    ("engine_torque_percent", |d, i| d.torque[i]),
-    ("engine_brake_frac", |d, i| d.engine_brake[i]),
-    ("xbr_decel_m_s2", |d, i| d.xbr[i]),
-    ("yaw_rate_rad_s", |d, i| d.yaw[i]),
-    ("accel_y_m_s2", |d, i| d.accel_y[i]),
-    ("steering_wheel_rad", |d, i| d.steer[i]),
-    ("trailer_yaw_rate_rad_s", |d, i| d.trailer_yaw[i]),
-    ("s_map_m", |d, i| d.s_map[i]),
-];
 
 /// Modules that are searched, with the prior size of an unknown effect in the module's unit (per
 /// row). The force module's rows are accelerations over one second.
@@ -104,21 +93,6 @@ const DISPERSION_PRIOR: f64 = 2.0;
 /// Excess of the whitened variance over drives in order that no tolerance explains.
 const RESTLESS: f64 = 1.1;
 
-/// A signal over the rows of a module: its means over `step` samples, or what it is as a shift
-/// begins.
-fn means(d: &Prepared, read: Read, module: Module) -> Vec<f64> {
-    if module == Module::Shift {
-        return d.shifts.iter().map(|s| read(d, s.0)).collect();
-    }
-    let step = module.row_step();
-    (0..d.n.div_ceil(step))
-        .map(|k| {
-            let (from, to) = (k * step, (k * step + step).min(d.n));
-            (from..to).map(|i| read(d, i)).sum::<f64>() / (to - from).max(1) as f64
-        })
-        .collect()
-}
-
 /// Means of a channel over rows of `step` samples.
 fn means_of(x: &[f64], step: usize) -> Vec<f64> {
     x.chunks(step).map(|row| row.iter().sum::<f64>() / row.len() as f64).collect()
@@ -140,12 +114,12 @@ fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
 /// ratio of their score contributions to the expected ones, drawn towards one by
 /// [`DISPERSION_PRIOR`] drives' worth. Bursts of model error (a hard stop) are not white noise, and
 /// evidence counts for less by this factor.
-fn dispersion(
+pub(crate) fn dispersion(
     systems: &[(DMatrix<f64>, DVector<f64>)],
     a: &DMatrix<f64>,
     w: &DVector<f64>,
 ) -> Option<f64> {
-    let inverse = (a + DMatrix::identity(KNOTS, KNOTS)).try_inverse()?;
+    let inverse = (a + DMatrix::identity(a.nrows(), a.nrows())).try_inverse()?;
     let drives = systems.len() as f64;
     let (mut seen, mut expected) = (0.0, 0.0);
     for (a, b) in systems {
@@ -160,8 +134,8 @@ fn dispersion(
 impl Problem<'_> {
     /// A disturbance that follows no measured signal: more variance than drives in order have, in
     /// tractor and trailer yaw alike (gusts), or far more in one module.
-    pub(crate) fn restless(&self, theta: &Theta) -> Option<Restless> {
-        let now = self.settled(theta);
+    pub(crate) fn restless(&self, at: &Point) -> Option<Restless> {
+        let now = self.settled(at);
         let excess = |m: Module| now[m as usize] / self.reference.settled[m as usize].max(1.0);
         let rows = |m: Module| -> f64 {
             let count = |d: &Prepared| d.valid[m as usize].iter().filter(|x| **x).count() as f64;
@@ -185,11 +159,12 @@ impl Problem<'_> {
             .max_by(|a, b| a.evidence.total_cmp(&b.evidence))
     }
 
-    /// The best free-form functions at `theta`, one per module and signal, best first.
-    pub(crate) fn shapes(&self, theta: &Theta) -> Vec<Shape> {
-        let residuals: Vec<Rest> = self.each(|i| self.rest(i, theta));
-        let mut rows_of: HashMap<(usize, &str), Vec<Vec<f64>>> = HashMap::new();
-        let mut out = Vec::new();
+    /// The best free-form functions beside the causes of a point and their courses, one per module
+    /// and signal, best first.
+    pub(crate) fn shapes(&self, at: &Point) -> Vec<Shape> {
+        let residuals: Vec<Rest> = self.each(|i| self.rest(i, at));
+        let mut rows_of: HashMap<(usize, usize), Vec<Vec<f64>>> = HashMap::new();
+        let mut out = self.parts(at, &residuals);
         for (module, size) in SEARCHED {
             let m = *module as usize;
             let rows: f64 = residuals.iter().map(|r| r.whitened[m].len() as f64).sum();
@@ -197,19 +172,19 @@ impl Problem<'_> {
                 continue;
             }
             let weights = SCALED.contains(module).then(|| {
-                self.each(|i| own_size(&self.drives[i], *module, &self.raw(i, *module, theta)))
+                self.each(|i| own_size(&self.drives[i], *module, &self.raw(i, *module, &at.theta)))
             });
-            for (signal, read) in SIGNALS {
-                if own(*module, signal) {
+            for (place, signal) in SIGNALS.iter().enumerate() {
+                if own(*module, signal.name) {
                     continue;
                 }
                 let values = rows_of
-                    .entry((module.row_step(), *signal))
-                    .or_insert_with(|| self.each(|i| means(&self.drives[i], *read, *module)));
-                out.extend(self.shape((*module, signal, None), *size, values, &residuals));
-                if let (Some(weights), true) = (&weights, SLOW.contains(signal)) {
-                    let form = (*module, *signal, Some(weights.as_slice()));
-                    out.extend(self.shape(form, FACTOR, values, &residuals));
+                    .entry((module.row_step(), place))
+                    .or_insert_with(|| self.each(|i| means(&self.drives[i], signal, *module)));
+                out.extend(self.shape(at, (*module, signal, None), *size, values, &residuals));
+                if let (Some(weights), true) = (&weights, SLOW.contains(&signal.name)) {
+                    let form = (*module, signal, Some(weights.as_slice()));
+                    out.extend(self.shape(at, form, FACTOR, values, &residuals));
                 }
             }
         }
@@ -221,7 +196,8 @@ impl Problem<'_> {
     /// the rows if there are any.
     fn shape(
         &self,
-        (module, signal, weights): (Module, &'static str, Option<&[Vec<f64>]>),
+        at: &Point,
+        (module, signal, weights): (Module, &Signal, Option<&[Vec<f64>]>),
         size: f64,
         values: &[Vec<f64>],
         residuals: &[Rest],
@@ -256,6 +232,9 @@ impl Problem<'_> {
         });
         let factor = kernel.cholesky()?.l() * size;
         let gram = self.together(parts.into_iter());
+        let keep: Vec<usize> = (0..=KNOTS).collect();
+        let course = at.course.behind(KNOTS);
+        let gram = course.taken_out(&gram, &keep, &at.theta, &self.reference.theta)?;
         let (a, b, _) = gram.sum(|_| true);
         let inside = |a: &DMatrix<f64>| factor.transpose() * a * &factor;
         let (a, b) = (inside(&a), factor.transpose() * b);
@@ -271,18 +250,25 @@ impl Problem<'_> {
         let firm = log_z - 0.5 * b.dot(&w) * (1.0 - 1.0 / dispersion(&systems, &a, &w)?);
         let f = &factor * &w;
         let taken = 2.0 * b.dot(&w) - (&a * &w).dot(&w);
-        let rows: f64 =
-            self.drives.iter().map(|d| d.valid[m].iter().filter(|x| **x).count() as f64).sum();
-        let chi: f64 = residuals.iter().flat_map(|r| &r.whitened[m]).map(|x| x * x).sum();
-        let excess = (chi - rows).max(taken).max(1.0);
         Some(Shape {
             module,
-            signal,
-            factor: weights.is_some(),
+            signal: signal.name,
+            memory_s: signal.memory_s,
+            acts: if weights.is_some() { Acts::Scaled } else { Acts::Added },
             log_z,
             firm,
             knots: (0..KNOTS).map(|k| (lo + k as f64 * width, f[k])).collect(),
-            explained_frac: (taken / excess).clamp(0.0, 1.0),
+            explained_frac: self.explained(module, residuals, taken),
         })
+    }
+
+    /// Part of a module's excess over its noise that a function takes, which is the whole of it at
+    /// the most.
+    pub(crate) fn explained(&self, module: Module, residuals: &[Rest], taken: f64) -> f64 {
+        let m = module as usize;
+        let rows: f64 =
+            self.drives.iter().map(|d| d.valid[m].iter().filter(|x| **x).count() as f64).sum();
+        let chi: f64 = residuals.iter().flat_map(|r| &r.whitened[m]).map(|x| x * x).sum();
+        (taken / (chi - rows).max(taken).max(1.0)).clamp(0.0, 1.0)
     }
 }

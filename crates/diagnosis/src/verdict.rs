@@ -95,9 +95,14 @@ pub struct Unknown {
     pub explained_frac: f64,
     /// Evidence, nats.
     pub evidence: f64,
-    /// Signal and error at the knots of the function; the error is a part of the quantity where
-    /// `shape` calls it a factor, otherwise in the unit of the balance.
+    /// Signal and error at the knots of the function; the error is a part of what it scales where it
+    /// is a factor, otherwise in the unit of the balance.
     pub table: Vec<(f64, f64)>,
+    /// The function is a factor, on the quantity or on a part of its balance (`shape` says which).
+    pub is_factor: bool,
+    /// The function follows a first-order memory of the signal with this time constant, s; 0: the
+    /// signal as it is.
+    pub memory_s: f64,
 }
 
 /// A cause that these drives cannot show.

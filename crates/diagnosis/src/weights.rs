@@ -5,8 +5,7 @@
 //! ```
 //! `k` causes (MacKay, Neural Computation 4, 1992). A cause's probability is the share of the models
 //! that hold it: the set that was found, the sets with one of its causes left out or replaced by
-//! another one, and none at all. Evidence of a cause beside a large one counts for less, by as much as
-//! the search asks more of it: what it adds may be the form of the large one.
+//! another one, and none at all. What a cause adds to the form of a large one is no evidence for it ([`crate::course`]).
 //!
 //! Left out: free functions, and what the catalogue does not have. A set that may stand in for such a
 //! thing is called ambiguous whatever its weight.

@@ -5,15 +5,13 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::Evidence;
+use crate::course::HATS;
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, PARAMS, Theta};
-use crate::problem::{Direction, Gram};
-use crate::replay::{MODULES, Module};
+use crate::problem::{Direction, Gram, Hat};
 
 /// One drive: whitened rows, what each parameter does to them, and the tolerances.
 pub(crate) struct LinearDrive {
-    /// Module of every row.
-    pub(crate) module: Module,
     /// Residual without any cause.
     pub(crate) residual: Vec<f64>,
     /// Rows of a size of one, per parameter.
@@ -45,6 +43,15 @@ impl LinearDrive {
         own.map_or_else(|| vec![0.0; self.residual.len()], |c| c.1.clone())
     }
 
+    /// Rows times a hat function of their place.
+    fn under(&self, rows: Vec<f64>, hat: Option<Hat>) -> Vec<f64> {
+        let Some(hat) = hat else { return rows };
+        let knots = (HATS - 1) as f64;
+        let place = |i: usize| i as f64 / (rows.len() - 1) as f64 * knots;
+        let weight = |i: usize| (1.0 - (place(i) - hat.knot as f64).abs()).max(0.0);
+        rows.iter().enumerate().map(|(i, x)| x * weight(i)).collect()
+    }
+
     fn residual_at(&self, theta: &Theta) -> Vec<f64> {
         let mut r = self.residual.clone();
         for (p, column) in &self.columns {
@@ -55,7 +62,7 @@ impl LinearDrive {
 
     fn gram(&self, theta: &Theta, directions: &[Direction]) -> DMatrix<f64> {
         let mut lines = vec![self.residual_at(theta)];
-        lines.extend(directions.iter().map(|d| self.column(d.p)));
+        lines.extend(directions.iter().map(|d| self.under(self.column(d.p), d.hat)));
         let of = |lines: &[Vec<f64>]| {
             let rows = self.residual.len();
             DMatrix::from_fn(rows, lines.len(), |i, j| lines[j][i])
@@ -82,29 +89,15 @@ impl Evidence for LinearProblem {
         self.drives.len()
     }
 
-    fn gram_along(
-        &self,
-        theta: &Theta,
-        _: &Theta,
-        directions: &[Direction],
-    ) -> (Gram, [f64; MODULES]) {
-        let per_drive = self.drives.iter().map(|d| d.gram(theta, directions)).collect();
-        let mut chi = [0.0; MODULES];
-        for d in &self.drives {
-            chi[d.module as usize] += d.residual_at(theta).iter().map(|r| r * r).sum::<f64>();
-        }
-        (Gram::without_common(per_drive), chi)
-    }
-
-    fn chi_at_zero(&self) -> [f64; MODULES] {
-        self.gram_along(&self.zero, &self.zero, &[]).1
+    fn gram_along(&self, theta: &Theta, _: &Theta, directions: &[Direction]) -> Gram {
+        Gram::without_common(self.drives.iter().map(|d| d.gram(theta, directions)).collect())
     }
 }
 
 impl Gram {
     /// Gram matrices of drives whose tolerances' means are known.
     fn without_common(per_drive: Vec<DMatrix<f64>>) -> Self {
-        Self { per_drive, common: Vec::new(), own: Arc::default() }
+        Self { per_drive, common: Vec::new(), own: Arc::default(), log_det: 0.0 }
     }
 }
 

@@ -34,11 +34,8 @@ impl Sensitivities {
             for start in h.starts {
                 let shape: Vec<(P, f64)> = h.shapes.iter().copied().zip(*start).collect();
                 let first = out.directions.len();
-                out.directions.extend(h.sizes.iter().map(|p| Direction {
-                    p: *p,
-                    shape: shape.clone(),
-                    step: p.spec().step,
-                }));
+                let of = |p: &P| Direction::new(*p, shape.clone(), p.spec().step);
+                out.directions.extend(h.sizes.iter().map(of));
                 let columns = (first..out.directions.len()).collect();
                 out.readings.push(Reading { id: h.id, typical: far(start) <= nearest, columns });
             }
@@ -57,7 +54,7 @@ impl Sensitivities {
         problem: &Problem<'_>,
         pick: impl Fn(usize) -> bool,
     ) -> Information {
-        let (gram, _) = problem.gram(&problem.reference.theta, &self.directions);
+        let gram = problem.gram(&problem.reference.theta, &self.directions);
         gram.sum(pick).0
     }
 

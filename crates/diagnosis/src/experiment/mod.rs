@@ -314,7 +314,7 @@ mod tests {
         let problem =
             Problem::with(&plant, driven(&hidden, 2), clean.reference.clone(), &Serial).unwrap();
         let theta = problem.reference.theta;
-        let norm = problem.gram(&theta, &[]).0.sum(|_| true).2;
+        let norm = problem.gram(&theta, &[]).sum(|_| true).2;
         let log_z = |id: &str| {
             let h = CATALOGUE.iter().position(|h| h.id == id).unwrap();
             problem.evidence().fit(&[h], &theta, norm).unwrap().log_z

@@ -181,7 +181,7 @@ impl Problem<'_> {
                     let mut t = *theta;
                     let x = &mut t[s.p as usize];
                     *x = (*x + sign * step).clamp(s.lo, s.hi);
-                    let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
+                    let c = cost(self.gram(&t, &[]).sum(|_| true).2, &t);
                     if c < *best {
                         (*theta, *best, moved) = (t, c, true);
                         break;
@@ -219,15 +219,13 @@ impl Problem<'_> {
     /// Gauss-Newton steps of the common calibration.
     pub(super) fn calibrate(&mut self, first: bool) -> Result<(), DiagnosisError> {
         let free: Vec<&crate::param::Spec> = SPECS.iter().filter(|s| s.calibration > 0.0).collect();
-        let directions: Vec<Direction> = free
-            .iter()
-            .map(|s| Direction { p: s.p, shape: Vec::new(), step: 0.3 * s.step })
-            .collect();
+        let directions: Vec<Direction> =
+            free.iter().map(|s| Direction::new(s.p, Vec::new(), 0.3 * s.step)).collect();
         let cost = |norm: f64, t: &Theta| {
             norm + free.iter().map(|s| (t[s.p as usize] / s.calibration).powi(2)).sum::<f64>()
         };
         let mut theta = self.reference.theta;
-        let (mut gram, _) = self.gram(&theta, &directions);
+        let mut gram = self.gram(&theta, &directions);
         let mut best = cost(gram.sum(|_| true).2, &theta);
         for _ in 0..if first { 4 } else { 2 } {
             let (mut a, mut b, _) = gram.sum(|_| true);
@@ -248,10 +246,10 @@ impl Problem<'_> {
                     let x = &mut t[s.p as usize];
                     *x = (*x + factor * d).clamp(s.lo, s.hi);
                 }
-                let c = cost(self.gram(&t, &[]).0.sum(|_| true).2, &t);
+                let c = cost(self.gram(&t, &[]).sum(|_| true).2, &t);
                 if c < best {
                     (theta, best, improved) = (t, c, true);
-                    gram = self.gram(&theta, &directions).0;
+                    gram = self.gram(&theta, &directions);
                 }
                 factor *= 0.4;
             }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::signals::Line;
-use super::{Direction, Problem, Rest, inner};
+use super::{Direction, Problem, Rest};
 use crate::param::Theta;
-use crate::replay::{MODULES, Module};
+use crate::replay::Module;
 use crate::unknown::KNOTS;
 
 /// Marginal Gram matrix per drive over `[r, columns]`.
@@ -21,6 +21,9 @@ pub(crate) struct Gram {
     pub(crate) common: Vec<DMatrix<f64>>,
     /// Information of a drive about the common effects.
     pub(crate) own: Arc<Vec<DMatrix<f64>>>,
+    /// Logarithm of the determinant of the random effects that were taken out beyond those of the
+    /// drives in order.
+    pub(crate) log_det: f64,
 }
 
 impl Gram {
@@ -75,32 +78,19 @@ impl Gram {
 }
 
 impl Problem<'_> {
-    /// Gram matrix of the residual at `theta` and the directions from there, and the raw
-    /// (not marginal) chi-square per module.
-    pub(crate) fn gram(&self, theta: &Theta, directions: &[Direction]) -> (Gram, [f64; MODULES]) {
+    /// Gram matrix of the residual at `theta` and the directions from there.
+    pub(crate) fn gram(&self, theta: &Theta, directions: &[Direction]) -> Gram {
         self.gram_along(theta, theta, directions)
     }
 
     /// The same with the directions from another point.
-    pub(crate) fn gram_along(
-        &self,
-        theta: &Theta,
-        from: &Theta,
-        directions: &[Direction],
-    ) -> (Gram, [f64; MODULES]) {
+    pub(crate) fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram {
         let parts = self.each(|i| {
             let mut lines = vec![self.at(i, theta)];
             lines.extend(directions.iter().map(|d| self.line(i, from, d)));
-            let (gram, common) = self.marginal(i, &lines);
-            (gram, self.chi(i, &lines[0]), common)
+            self.marginal(i, &lines)
         });
-        let mut chi = [0.0; MODULES];
-        for p in &parts {
-            for (c, x) in chi.iter_mut().zip(&p.1) {
-                *c += x;
-            }
-        }
-        (self.together(parts.into_iter().map(|p| (p.0, p.2))), chi)
+        self.together(parts.into_iter())
     }
 
     /// Gram matrix of the residual at `theta`, the directions from there, and further columns of one
@@ -127,27 +117,7 @@ impl Problem<'_> {
         parts: impl Iterator<Item = (DMatrix<f64>, DMatrix<f64>)>,
     ) -> Gram {
         let (per_drive, common) = parts.unzip();
-        Gram { per_drive, common, own: self.common.clone() }
-    }
-
-    /// Squared length of whitened signals per module.
-    fn chi(&self, i: usize, line: &Line) -> [f64; MODULES] {
-        let mut out = [0.0; MODULES];
-        for signals in line {
-            for (m, w) in signals.group.modules().iter().zip(self.white(i, signals)) {
-                out[*m as usize] += inner(w, w);
-            }
-        }
-        out
-    }
-
-    /// Squared whitened residuals per module at the reference.
-    pub(crate) fn chi_at_reference(&self) -> [f64; MODULES] {
-        let mut out = [0.0; MODULES];
-        for (i, n) in self.nuisance.iter().enumerate() {
-            out.iter_mut().zip(self.chi(i, &n.base)).for_each(|(x, c)| *x += c);
-        }
-        out
+        Gram { per_drive, common, own: self.common.clone(), log_det: 0.0 }
     }
 
     /// Gram matrix of given lines in the metric `M` of a drive, and their products with the common
@@ -175,10 +145,11 @@ impl Problem<'_> {
         against
     }
 
-    /// Marginal Gram matrix over the residual and hat functions of one module: `places` gives the
-    /// knot to the left and the size of its hat and of the next, per row. Only a few hats touch a row, so the
-    /// whitened hats are never written out, and everything else comes to the hats through the
-    /// adjoint of the whitening filter. With the products with the common effects.
+    /// Marginal Gram matrix over the residual, hat functions of one module and the courses of the
+    /// causes: `places` gives the knot to the left and the size of its hat and of the next, per row.
+    /// Only a few hats touch a row, so the whitened hats are never written out, and everything else
+    /// comes to the hats through the adjoint of the whitening filter. With the products with the
+    /// common effects.
     pub(crate) fn hats(
         &self,
         i: usize,
@@ -190,16 +161,19 @@ impl Problem<'_> {
         let whitener = &self.reference.whiteners[m];
         let adjoint = self.adjoint(i, m);
         let touched = adjoint.columns.len();
-        let residual = whitener.adjoint(&rest.whitened[m]);
+        let lines = rest.products.nrows();
+        let own = &rest.adjoint[m];
         let mut g = [[0.0; KNOTS]; KNOTS];
-        let mut r = [0.0; KNOTS];
+        let mut r = vec![[0.0; KNOTS]; own.len()];
         let mut z = vec![0.0; touched * KNOTS];
-        let rows = residual.len().min(places.len());
+        let rows = rest.whitened[m].len().min(places.len());
         for k in 0..rows {
             let Some((left, sizes)) = places[k] else { continue };
             let row = &adjoint.rows[k * touched..(k + 1) * touched];
             for (at, w) in [(left, sizes[0]), (left + 1, sizes[1])] {
-                r[at] += residual[k] * w;
+                for (r, (_, line)) in r.iter_mut().zip(own) {
+                    r[at] += line.get(k).copied().unwrap_or(0.0) * w;
+                }
                 let z = &mut z[at * touched..(at + 1) * touched];
                 z.iter_mut().zip(row).for_each(|(z, c)| *z += c * w);
             }
@@ -219,13 +193,23 @@ impl Problem<'_> {
             }
         }
         let scale = 1.0 / (whitener.sigma * whitener.sigma);
-        let mut out = DMatrix::zeros(KNOTS + 1, KNOTS + 1);
-        let mut against = DMatrix::zeros(nuisance.sigma.len(), KNOTS + 1);
-        out[(0, 0)] = rest.norm;
-        against.set_column(0, &rest.tolerances);
+        // Columns: residual, hats, courses.
+        let at = |line: usize| if line == 0 { 0 } else { KNOTS + line };
+        let mut out = DMatrix::zeros(KNOTS + lines, KNOTS + lines);
+        let mut against = DMatrix::zeros(nuisance.sigma.len(), KNOTS + lines);
+        for a in 0..lines {
+            against.set_column(at(a), &rest.tolerances.column(a));
+            for b in 0..lines {
+                out[(at(a), at(b))] = rest.products[(a, b)];
+            }
+        }
+        for ((line, _), r) in own.iter().zip(&r) {
+            for (a, r) in r.iter().enumerate() {
+                out[(at(*line), a + 1)] = *r;
+                out[(a + 1, at(*line))] = *r;
+            }
+        }
         for a in 0..KNOTS {
-            out[(0, a + 1)] = r[a];
-            out[(a + 1, 0)] = r[a];
             for b in a..KNOTS {
                 out[(a + 1, b + 1)] = scale * g[a][b];
                 out[(b + 1, a + 1)] = scale * g[a][b];

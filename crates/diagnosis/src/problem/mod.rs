@@ -6,6 +6,7 @@
 
 mod calibrate;
 mod gram;
+mod hat;
 mod nuisance;
 mod signals;
 
@@ -22,6 +23,7 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
+use crate::course::Point;
 use crate::param::{P, PARAMS, SPECS, Theta};
 use crate::replay::{GROUPS, MODULES, Prepared, Residuals, replay_group};
 use crate::stats::whiten::Whitener;
@@ -57,6 +59,7 @@ pub(crate) struct Problem<'a> {
     /// Information of every drive about the means of the tolerances.
     common: Arc<Vec<DMatrix<f64>>>,
     kept: Vec<Kept>,
+    hats: hat::Hats,
     executor: &'a dyn Executor,
 }
 
@@ -67,13 +70,29 @@ pub(crate) struct Direction {
     /// Shape parameters that hold while the direction is taken.
     pub(crate) shape: Vec<(P, f64)>,
     pub(crate) step: f64,
+    /// What its rows are multiplied with.
+    pub(crate) hat: Option<Hat>,
+}
+
+/// One of the [`HATS`](crate::course::HATS) hat functions over a signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Hat {
+    /// Index into [`SIGNALS`](crate::signal::SIGNALS).
+    pub(crate) signal: usize,
+    pub(crate) knot: usize,
+}
+
+impl Direction {
+    pub(crate) fn new(p: P, shape: Vec<(P, f64)>, step: f64) -> Self {
+        Self { p, shape, step, hat: None }
+    }
 }
 
 fn nuisance_directions(tolerance: &[f64; PARAMS]) -> Vec<Direction> {
     SPECS
         .iter()
         .filter(|s| tolerance[s.p as usize] > 0.0)
-        .map(|s| Direction { p: s.p, shape: Vec::new(), step: s.step })
+        .map(|s| Direction::new(s.p, Vec::new(), s.step))
         .collect()
 }
 
@@ -108,9 +127,10 @@ impl<'a> Problem<'a> {
             problem.reference.mean_spread = [(1.0 / problem.drives.len() as f64).sqrt(); PARAMS];
             problem.rebuild(Changed::Scatter)?;
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
-            problem.reference.settled = problem.settled(&problem.reference.theta);
+            let bare = Point::bare(problem.reference.theta);
+            problem.reference.settled = problem.settled(&bare);
             let count = problem.drives.len() as f64;
-            for s in problem.shapes(&problem.reference.theta) {
+            for s in problem.shapes(&bare) {
                 let f = &mut problem.reference.free_form[s.module as usize];
                 *f = f.max(s.log_z / count);
             }
@@ -175,6 +195,7 @@ impl<'a> Problem<'a> {
             nuisance: Vec::new(),
             common: Arc::default(),
             kept,
+            hats: hat::Hats::default(),
             executor,
         };
         problem.rebuild(Changed::Everything)?;

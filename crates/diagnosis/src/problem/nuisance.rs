@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::signals::Line;
 use super::{Problem, inner, nuisance_directions};
 use crate::DiagnosisError;
-use crate::param::Theta;
+use crate::course::Point;
 use crate::replay::MODULES;
 
 /// Tolerances of one drive at the reference.
@@ -34,11 +34,17 @@ pub(super) struct Adjoint {
     pub(super) rows: Vec<f64>,
 }
 
-/// What is left of a drive: whitened, its squared length, its product with the tolerances.
+/// What is left of a drive, and the courses of the causes that are there: residual first.
 pub(crate) struct Rest {
+    /// Whitened residual.
     pub(crate) whitened: [Vec<f64>; MODULES],
-    pub(super) norm: f64,
-    pub(super) tolerances: DVector<f64>,
+    lines: Vec<Line>,
+    /// Inner products of the lines.
+    pub(super) products: DMatrix<f64>,
+    /// Products of the tolerances with the lines.
+    pub(super) tolerances: DMatrix<f64>,
+    /// Per module, the whitened lines that reach it through the adjoint of its filter.
+    pub(super) adjoint: [Vec<(usize, Vec<f64>)>; MODULES],
 }
 
 impl Nuisance {
@@ -143,26 +149,43 @@ impl Problem<'_> {
         n.factor.solve(&self.against(i, &n.base)).iter().copied().collect()
     }
 
-    /// What is left of drive `i` at `theta`.
-    pub(crate) fn rest(&self, i: usize, theta: &Theta) -> Rest {
-        let line = self.at(i, theta);
-        let whitened = self.spread(i, &line);
+    /// What is left of drive `i`.
+    pub(crate) fn rest(&self, i: usize, at: &Point) -> Rest {
+        let mut lines = vec![self.at(i, &at.theta)];
+        lines.extend(at.directions.iter().map(|d| self.line(i, &at.theta, d)));
+        let tolerances: Vec<DVector<f64>> = lines.iter().map(|l| self.against(i, l)).collect();
+        let mut adjoint: [Vec<(usize, Vec<f64>)>; MODULES] = Default::default();
+        for (j, line) in lines.iter().enumerate() {
+            for signals in line {
+                for (m, w) in signals.group.modules().iter().zip(self.white(i, signals)) {
+                    if !w.is_empty() {
+                        let m = *m as usize;
+                        adjoint[m].push((j, self.reference.whiteners[m].adjoint(w)));
+                    }
+                }
+            }
+        }
         Rest {
-            tolerances: self.against(i, &line),
-            norm: whitened.iter().map(|w| inner(w, w)).sum(),
-            whitened,
+            whitened: self.spread(i, &lines[0]),
+            products: self.inner_products(i, &lines),
+            tolerances: DMatrix::from_columns(&tolerances),
+            adjoint,
+            lines,
         }
     }
 
     /// Mean square of whitened residuals per module after what the tolerances of each drive can
-    /// take is taken out; 1 where a module has no rows.
-    pub(crate) fn settled(&self, theta: &Theta) -> [f64; MODULES] {
+    /// and the courses of the causes can take is taken out; 1 where a module has no rows.
+    pub(crate) fn settled(&self, at: &Point) -> [f64; MODULES] {
+        let own = at.course.deviations(at.directions.len(), &at.theta, &self.reference.theta);
         let parts = self.each(|i| {
-            let rest = self.rest(i, theta);
+            let rest = self.rest(i, at);
             let nuisance = &self.nuisance[i];
-            let z = nuisance.factor.solve(&rest.tolerances);
-            let mut left = rest.whitened;
-            for ((line, sigma), z) in nuisance.columns.iter().zip(&nuisance.sigma).zip(z.iter()) {
+            let sigma: Vec<f64> = nuisance.sigma.iter().chain(&own).copied().collect();
+            let z = self.taken(i, &rest, &own);
+            let columns = nuisance.columns.iter().chain(&rest.lines[1..]);
+            let mut left = rest.whitened.clone();
+            for ((line, sigma), z) in columns.zip(&sigma).zip(z.iter()) {
                 for signals in line {
                     for (m, c) in signals.group.modules().iter().zip(self.white(i, signals)) {
                         let left = left[*m as usize].iter_mut();
@@ -178,6 +201,26 @@ impl Problem<'_> {
             let sum: f64 = parts.iter().map(|p| p[m]).sum();
             if rows > 0 && sum > 0.0 { sum / rows as f64 } else { 1.0 }
         })
+    }
+
+    /// Posterior means of the tolerances of a drive and of the courses, whose deviations are `own`,
+    /// in their deviations.
+    fn taken(&self, i: usize, rest: &Rest, own: &[f64]) -> DVector<f64> {
+        let scaled = self.nuisance[i].scaled();
+        let (q, w) = (scaled.nrows(), own.len());
+        let against = |a: usize, j: usize| {
+            if a < q { rest.tolerances[(a, j)] } else { own[a - q] * rest.products[(a - q + 1, j)] }
+        };
+        let information = DMatrix::from_fn(q + w, q + w, |a, b| {
+            let product = match (a < q, b < q) {
+                (true, true) => scaled[(a, b)],
+                (_, false) => own[b - q] * against(a, b - q + 1),
+                (false, true) => own[a - q] * against(b, a - q + 1),
+            };
+            product + if a == b { 1.0 } else { 0.0 }
+        });
+        let gradient = DVector::from_fn(q + w, |a, _| against(a, 0));
+        information.cholesky().map_or_else(|| DVector::zeros(q + w), |f| f.solve(&gradient))
     }
 
     /// The tolerances' columns in module `m` of drive `i` through the adjoint of its filter.

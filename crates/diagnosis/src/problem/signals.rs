@@ -6,6 +6,7 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{Direction, Problem, inner};
+use crate::course::HATS;
 use crate::param::{SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
 
@@ -153,7 +154,8 @@ impl Problem<'_> {
         for (p, v) in &direction.shape {
             t[*p as usize] = *v;
         }
-        let key: Key = [group as u64, direction.p as u64, direction.step.to_bits()]
+        let hat = direction.hat.map_or(0, |h| 1 + (h.signal * HATS + h.knot) as u64);
+        let key: Key = [group as u64, direction.p as u64, direction.step.to_bits(), hat]
             .into_iter()
             .chain(seen(group, theta))
             .chain(seen(group, &t))
@@ -161,28 +163,33 @@ impl Problem<'_> {
         if let Some(kept) = self.kept[i].get(&key) {
             return kept;
         }
-        let raw =
-            if let Some(offset) = offset_of(direction.p).filter(|o| group.modules().contains(o)) {
-                let d = &self.drives[i];
-                let of = |m: &crate::replay::Module| -> Vec<f64> {
-                    let size = if *m == offset { 1.0 } else { 0.0 };
-                    let rows = &d.valid[*m as usize];
-                    if d.available[*m as usize] {
-                        rows.iter().map(|ok| if *ok { size } else { 0.0 }).collect()
-                    } else {
-                        Vec::new()
-                    }
-                };
-                group.modules().iter().map(of).collect()
-            } else {
-                t[direction.p as usize] += direction.step;
-                let mut moved = self.replay_one(i, group, &t);
-                let base = self.point(i, group, theta);
-                for (x, b) in moved.iter_mut().flatten().zip(base.raw.iter().flatten()) {
-                    *x = (b - *x) / direction.step;
+        let raw = if let Some(hat) = direction.hat {
+            let whole = Direction { hat: None, ..direction.clone() };
+            let whole = self.sensitivity(i, group, theta, &whole);
+            let modules = group.modules().iter().zip(whole.raw.iter());
+            modules.map(|(m, rows)| self.under_hat(i, *m, hat, rows)).collect()
+        } else if let Some(offset) = offset_of(direction.p).filter(|o| group.modules().contains(o))
+        {
+            let d = &self.drives[i];
+            let of = |m: &crate::replay::Module| -> Vec<f64> {
+                let size = if *m == offset { 1.0 } else { 0.0 };
+                let rows = &d.valid[*m as usize];
+                if d.available[*m as usize] {
+                    rows.iter().map(|ok| if *ok { size } else { 0.0 }).collect()
+                } else {
+                    Vec::new()
                 }
-                moved
             };
+            group.modules().iter().map(of).collect()
+        } else {
+            t[direction.p as usize] += direction.step;
+            let mut moved = self.replay_one(i, group, &t);
+            let base = self.point(i, group, theta);
+            for (x, b) in moved.iter_mut().flatten().zip(base.raw.iter().flatten()) {
+                *x = (b - *x) / direction.step;
+            }
+            moved
+        };
         let signals = Arc::new(Signals::new(group, false, Arc::new(raw)));
         self.kept[i].put(key, signals.clone());
         signals

@@ -25,7 +25,7 @@ fn plus(a: &[f64], b: &[f64]) -> Vec<f64> {
 /// One drive of the force balance.
 fn drive(residual: Vec<f64>, columns: &[(P, Vec<f64>)]) -> LinearDrive {
     let columns = columns.to_vec();
-    LinearDrive { module: Module::Force, residual, columns, tolerances: Vec::new() }
+    LinearDrive { residual, columns, tolerances: Vec::new() }
 }
 
 /// The same drive `count` times.
@@ -81,18 +81,50 @@ fn of_a_collinear_pair_one_is_found_and_the_other_says_as_much() {
     assert!((fit.log_z - gain).abs() < 3.0, "{} {gain}", fit.log_z);
 }
 
-/// A large cause whose course differs by 4 % from the catalogue's leaves what another cause would
-/// take: far more nats than one needs that stands alone.
+/// Rows times what grows evenly from -1 to 1 over them.
+fn growing(x: &[f64]) -> Vec<f64> {
+    let place = |i: usize| 2.0 * i as f64 / (ROWS - 1) as f64 - 1.0;
+    x.iter().enumerate().map(|(i, x)| x * place(i)).collect()
+}
+
+/// A large cause whose course differs by 5 % from the catalogue's leaves what another cause would
+/// take: far more nats than one needs that stands alone. Known exactly, it would be a cause.
 #[test]
 fn a_helper_that_patches_the_form_of_a_large_cause_is_not_taken() {
-    let columns = [(P::Rolling, times(&wave(1), 800.0)), (P::Drag, times(&wave(2), 800.0))];
-    let course = plus(&columns[0].1, &times(&wave(2), 0.04 * 800.0));
+    let (one, patch) = (wave(1), growing(&wave(1)));
+    let columns = [(P::Rolling, times(&one, 800.0)), (P::Drag, times(&patch, 200.0))];
+    let course = plus(&columns[0].1, &times(&patch, 0.05 * 800.0));
     let problem = alike(6, &times(&course, 0.4), &columns);
-    let (names, fit, empty) = found(&problem, &[ROLLING, DRAG]);
+    let (names, fit, _) = found(&problem, &[ROLLING, DRAG]);
     assert_eq!(names, [ROLLING]);
-    let evidence: &dyn Evidence = &problem;
-    let helper = evidence.screen(&fit, &[LinearProblem::cause(DRAG)]).singles(None)[0].gain;
-    assert!(helper > 50.0 && helper < 0.003 * (fit.log_z - empty.log_z), "{helper}");
+    assert!((fit.theta[P::Rolling as usize] - 0.4).abs() < 0.01);
+    let patched =
+        0.5 * 6.0 * (0.4 * 0.05 * 800.0_f64).powi(2) * patch.iter().map(|x| x * x).sum::<f64>();
+    assert!(patched > 200.0, "{patched}");
+}
+
+/// Beside a cause that explains millions of nats another one is named by its own evidence: no share
+/// of the large one is asked of it, for it does what no course of the large one does.
+#[test]
+fn a_small_cause_beside_a_very_strong_one_is_found() {
+    let columns = [(P::Rolling, times(&wave(1), 4000.0)), (P::Drag, times(&wave(2), STRONG))];
+    let residual = plus(&times(&columns[0].1, 0.4), &times(&columns[1].1, 0.2));
+    let (mut names, fit, empty) = found(&alike(6, &residual, &columns), &[ROLLING, DRAG]);
+    assert!(fit.log_z - empty.log_z > 1e6);
+    names.sort_unstable();
+    assert_eq!(names, [DRAG, ROLLING]);
+}
+
+/// What drives in plenty say about a size is no better than the form of the cause.
+#[test]
+fn a_size_is_known_no_better_than_the_form_of_its_cause() {
+    let sigma = |strength: f64| {
+        let columns = [(P::Rolling, times(&wave(1), strength))];
+        let (_, fit, _) = found(&alike(6, &times(&columns[0].1, 0.4), &columns), &[ROLLING]);
+        fit.covariance[(0, 0)].sqrt()
+    };
+    assert!(sigma(4000.0) > 0.02 * 0.4, "{}", sigma(4000.0));
+    assert!((sigma(STRONG) - 1.0 / (6.0_f64.sqrt() * STRONG)).abs() < 0.01);
 }
 
 #[test]
@@ -161,7 +193,7 @@ fn every_drive_says_which_size_it_alone_would_choose() {
     for (i, sizes) in alone.iter().enumerate() {
         let expected = if i == 3 { 1.5 } else { 1.2 };
         assert_eq!((sizes[0].id, sizes[0].parameter), (ROLLING, "coefficient_scale"));
-        assert!((sizes[0].value - expected).abs() < 1e-9, "{i}: {sizes:?}");
-        assert!((sizes[0].sigma - 1.0 / STRONG).abs() < 1e-9);
+        assert!((sizes[0].value - expected).abs() < 0.01, "{i}: {sizes:?}");
+        assert!((sizes[0].sigma * STRONG - 1.0).abs() < 0.1, "{i}: {sizes:?}");
     }
 }

@@ -114,12 +114,12 @@ function why() {
 
 /** The function that was found, at its knots. */
 function found() {
-  const { table: knots, signals, shape, quantity } = D.unknown;
+  const { table: knots, signals, quantity, is_factor: factor, memory_s: memory } = D.unknown;
   if (!knots.length) return;
-  const factor = shape.includes("off by a factor"), div = node("div", undefined, "plot");
+  const div = node("div", undefined, "plot");
   byId("causes").append(div);
   Plotly.newPlot(div, [{ type: "scatter", mode: "lines+markers", x: knots.map((k) => k[0]), y: knots.map((k) => factor ? 100 * k[1] : k[1]), line: { color: "#8a5fbf" } }],
-    { ...base, showlegend: false, xaxis: axis(label(signals[0])), yaxis: axis(factor ? `error of ${split(quantity)[0]}, %` : `error in the balance of ${split(quantity)[0]}`) }, plain);
+    { ...base, showlegend: false, xaxis: axis(memory ? `${label(signals[0])}, over the last ${fixed(memory / 60, 2)} min` : label(signals[0])), yaxis: axis(factor ? "error of what it scales, %" : `error in the balance of ${split(quantity)[0]}`) }, plain);
 }
 
 function overlay() {

@@ -1,0 +1,239 @@
+//! The course of a cause in this truck, and its scatter between drives.
+//!
+//! No truck has a cause exactly as the catalogue writes it: a fan does not turn by its law, a
+//! retarder gives more when it is cold, a payload lies elsewhere on the next trip. Beside its size
+//! `theta` a cause therefore has random effects of zero mean that vanish with it:
+//!
+//! ```text
+//! r_d = theta S_d + theta u_d S_d + theta sum_k w_k (S_d o B_k) + ...
+//! u_d ~ N(0, tau²)   of each drive for itself
+//! w_k ~ N(0, rho²)   of all drives together, B_k hat functions of a signal that drives the cause
+//! ```
+//! (Kennedy and O'Hagan, J. R. Statist. Soc. B 63, 2001; here multiplicative.) What another cause
+//! would patch of the form of a large one is explained without it, and a size is known no better
+//! than its form.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::param::{P, Theta};
+use crate::problem::{Direction, Gram, Hat};
+use crate::refit::{Fit, directions};
+use crate::signal::signal;
+
+/// Standard deviation of a cause's size between drives, in its size.
+const TAU: f64 = 0.03;
+/// Standard deviation of a cause's course along a signal, in its size.
+const RHO: f64 = 0.05;
+/// Hat functions along one signal.
+pub(crate) const HATS: usize = 4;
+
+/// Signals along which the course of a cause with this size may differ: those that drive it.
+pub(crate) fn signals(p: P) -> &'static [&'static str] {
+    match p {
+        P::Rolling => &["speed_m_s", "time_s"],
+        // The law of speed is what tells these apart.
+        P::Drag | P::Headwind | P::DragBrake => &["time_s"],
+        P::Mass => &["grade_frac", "accel_y_m_s2"],
+        P::GradeBias => &["grade_frac"],
+        P::WindX | P::WindY | P::Crosswind | P::MapShift | P::WarmupAmp => &["time_s"],
+        P::SteerOffset | P::YawBias | P::SteerRatio | P::SpeedScale => &["time_s"],
+        P::DrivelineLoss => &["engine_torque_percent"],
+        P::FanPower => &["engine_speed_rpm", "coolant_temp_degc"],
+        P::Friction | P::PedalDelay | P::TurboLag | P::EngineBrakeScale => &["engine_speed_rpm"],
+        P::Altitude => &["gps_altitude_m", "engine_speed_rpm"],
+        P::HeatAir => &["ambient_temp_degc", "engine_speed_rpm"],
+        P::HeatCoolant => &["coolant_temp_degc", "engine_speed_rpm"],
+        P::ShiftTime => &["gear"],
+        P::FuelLow => &["engine_speed_rpm", "engine_torque_percent"],
+        P::BrakeGain | P::BrakeDelay => &["brake_pressure_kpa"],
+        P::Fade => &["speed_m_s", "brake_pressure_kpa"],
+        P::RetarderStage | P::RetarderBrake | P::RetarderCoast => &["speed_m_s", "time_s"],
+        P::FreePlay | P::SteerLag | P::PayloadX => &["speed_m_s"],
+        P::CFront | P::CDrive | P::CTrailer => &["speed_m_s", "accel_y_m_s2"],
+        P::Bank => &["curvature_1_m"],
+        _ => &[],
+    }
+}
+
+/// Random effects of one size: columns of a Gram matrix (the residual is column 0).
+#[derive(Debug, Clone)]
+struct Effect {
+    p: P,
+    /// Its sensitivity.
+    column: usize,
+    /// Its hats, per signal.
+    hats: Vec<Vec<usize>>,
+}
+
+/// Random effects of the sizes among some directions.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Course(Vec<Effect>);
+
+impl Course {
+    /// The effects of those of `directions` whose parameters are `sizes`; appends their hats.
+    pub(crate) fn of(sizes: &[P], directions: &mut Vec<Direction>) -> Self {
+        let mut out = Vec::new();
+        for j in 0..directions.len() {
+            let p = directions[j].p;
+            if !sizes.contains(&p) {
+                continue;
+            }
+            let mut hats = Vec::new();
+            for signal in signals(p).iter().filter_map(|s| signal(s)) {
+                let first = directions.len() + 1;
+                for knot in 0..HATS {
+                    let hat = Some(Hat { signal, knot });
+                    directions.push(Direction { hat, ..directions[j].clone() });
+                }
+                hats.push((first..first + HATS).collect());
+            }
+            out.push(Effect { p, column: j + 1, hats });
+        }
+        Self(out)
+    }
+
+    /// The same in a matrix with `more` columns between the residual and the directions.
+    pub(crate) fn behind(&self, more: usize) -> Self {
+        let mut out = self.clone();
+        for e in &mut out.0 {
+            e.column += more;
+            e.hats.iter_mut().flatten().for_each(|j| *j += more);
+        }
+        out
+    }
+
+    /// Standard deviations of the directions' random effects at `theta`, those of drives and those
+    /// common to all alike; 0 for those that have none.
+    pub(crate) fn deviations(&self, count: usize, theta: &Theta, zero: &Theta) -> Vec<f64> {
+        let mut out = vec![0.0; count];
+        for e in &self.0 {
+            let size = (theta[e.p as usize] - zero[e.p as usize]).abs();
+            out[e.column - 1] = TAU * size;
+            e.hats.iter().flatten().for_each(|j| out[j - 1] = RHO * size);
+        }
+        out
+    }
+
+    /// The same without the effects of some sizes.
+    pub(crate) fn without(&self, sizes: &[P]) -> Self {
+        Self(self.0.iter().filter(|e| !sizes.contains(&e.p)).cloned().collect())
+    }
+
+    /// The Gram matrix over the columns `keep` with these effects taken out, the sizes being those of
+    /// `theta` beyond `zero`. `None` where it is not positive definite.
+    ///
+    /// A course is one of what shows of a cause: where the tolerances can take a cause (a headwind is
+    /// almost a little more drag) but not its course, the course shows no more than the cause does.
+    /// Else any cause would bring a free function along for what trucks in order leave, too.
+    pub(crate) fn taken_out(
+        &self,
+        gram: &Gram,
+        keep: &[usize],
+        theta: &Theta,
+        zero: &Theta,
+    ) -> Option<Gram> {
+        let shows = |j: usize| gram.per_drive.iter().map(|g| g[(j, j)]).sum::<f64>();
+        let (mut between, mut along) = (Vec::new(), Vec::new());
+        for e in &self.0 {
+            let size = (theta[e.p as usize] - zero[e.p as usize]).abs();
+            between.push((e.column, TAU * size));
+            for hats in &e.hats {
+                let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
+                let part = (shows(e.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
+                along.extend(hats.iter().map(|j| (*j, RHO * size * part)));
+            }
+        }
+        gram.marginal(keep, &between, &along)
+    }
+}
+
+/// A point with the courses of the causes that are there: where what is left over is judged.
+pub(crate) struct Point {
+    pub(crate) theta: Theta,
+    pub(crate) directions: Vec<Direction>,
+    pub(crate) course: Course,
+}
+
+impl Point {
+    /// Without causes.
+    pub(crate) fn bare(theta: Theta) -> Self {
+        Self { theta, directions: Vec::new(), course: Course::default() }
+    }
+
+    pub(crate) fn of(fit: &Fit) -> Self {
+        let sizes = fit.sizes();
+        let mut directions = directions(&sizes, &fit.theta);
+        let course = Course::of(&sizes, &mut directions);
+        Self { theta: fit.theta, directions, course }
+    }
+}
+
+impl Gram {
+    /// The same over the columns `keep`, with random effects taken out: columns that every drive has
+    /// for itself and columns that all share, each with its standard deviation.
+    fn marginal(
+        &self,
+        keep: &[usize],
+        between: &[(usize, f64)],
+        along: &[(usize, f64)],
+    ) -> Option<Self> {
+        let (u, w) = (between.len(), along.len());
+        let n = self.per_drive.first()?.nrows();
+        let q = self.own.first().map_or(0, DMatrix::nrows);
+        let mut out = Self {
+            per_drive: Vec::new(),
+            common: Vec::new(),
+            own: std::sync::Arc::default(),
+            log_det: 0.0,
+        };
+        let (mut owns, mut all, mut before) =
+            (Vec::new(), DMatrix::identity(q + w, q + w), DMatrix::identity(q, q));
+        for (i, g) in self.per_drive.iter().enumerate() {
+            let empty = DMatrix::zeros(0, n);
+            let (c, own) = match (self.common.get(i), self.own.get(i)) {
+                (Some(c), Some(own)) => (c, own.clone()),
+                _ => (&empty, DMatrix::zeros(0, 0)),
+            };
+            before += &own;
+            let columns = |x: &DMatrix<f64>, of: &[(usize, f64)]| {
+                DMatrix::from_fn(x.nrows(), of.len(), |r, j| x[(r, of[j].0)] * of[j].1)
+            };
+            let (gu, cu) = (columns(g, between), columns(c, between));
+            let inner = DMatrix::from_fn(u, u, |a, b| {
+                between[a].1 * gu[(between[a].0, b)] + if a == b { 1.0 } else { 0.0 }
+            });
+            let factor = inner.cholesky()?;
+            out.log_det += 2.0 * factor.l().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+            let g = g - &gu * factor.solve(&gu.transpose());
+            let c = c - &cu * factor.solve(&gu.transpose());
+            let own = own - &cu * factor.solve(&cu.transpose());
+            let (gw, cw) = (columns(&g, along), columns(&c, along));
+            let common = DMatrix::from_fn(q + w, keep.len(), |r, j| {
+                if r < q { c[(r, keep[j])] } else { gw[(keep[j], r - q)] }
+            });
+            let mut wide = DMatrix::zeros(q + w, q + w);
+            wide.view_mut((0, 0), (q, q)).copy_from(&own);
+            wide.view_mut((0, q), (q, w)).copy_from(&cw);
+            wide.view_mut((q, 0), (w, q)).copy_from(&cw.transpose());
+            let ww = DMatrix::from_fn(w, w, |a, b| along[a].1 * gw[(along[a].0, b)]);
+            wide.view_mut((q, q), (w, w)).copy_from(&ww);
+            all += &wide;
+            owns.push(wide);
+            out.common.push(common);
+            out.per_drive.push(crate::stats::evidence::sub(&g, keep));
+        }
+        let log_det = |m: DMatrix<f64>| -> Option<f64> {
+            Some(2.0 * m.cholesky()?.l().diagonal().iter().map(|x| x.ln()).sum::<f64>())
+        };
+        out.log_det += log_det(all)? - log_det(before)?;
+        out.own = std::sync::Arc::new(owns);
+        Some(out)
+    }
+
+    /// Information and gradient over all drives, and what the residual costs: its squared length and
+    /// the logarithm of the determinant of the random effects.
+    pub(crate) fn total(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let (a, b, norm) = self.sum(|_| true);
+        (a, b, norm + self.log_det)
+    }
+}

@@ -1,0 +1,70 @@
+//! Hat functions of a signal over the rows of a module, for the [course](crate::course) of causes.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex};
+
+use super::{Hat, Problem};
+use crate::course::HATS;
+use crate::replay::Module;
+use crate::signal::{SIGNALS, means};
+
+/// Part of the rows below the first and above the last knot.
+const TAIL: f64 = 0.02;
+
+/// A signal over the rows of a module.
+#[derive(Debug)]
+struct Places {
+    /// Values at the knots.
+    knots: [f64; HATS],
+    /// Places of rows between the knots, 0 to `HATS - 1`, per drive.
+    rows: Vec<Vec<f64>>,
+}
+
+/// What has been asked for, by module and signal.
+#[derive(Debug, Default)]
+pub(super) struct Hats(Mutex<HashMap<(Module, usize), Arc<Places>>>);
+
+impl Problem<'_> {
+    /// Rows of a module times a hat function.
+    pub(super) fn under_hat(&self, i: usize, module: Module, hat: Hat, rows: &[f64]) -> Vec<f64> {
+        let places = self.places(module, hat.signal);
+        let weight = |x: &f64| (1.0 - (x - hat.knot as f64).abs()).max(0.0);
+        rows.iter().zip(&places.rows[i]).map(|(r, x)| r * weight(x)).collect()
+    }
+
+    /// Values of a signal at the knots of its hats over a module.
+    pub(crate) fn knots(&self, module: Module, signal: usize) -> [f64; HATS] {
+        self.places(module, signal).knots
+    }
+
+    fn places(&self, module: Module, signal: usize) -> Arc<Places> {
+        let key = (module, signal);
+        if let Some(known) = self.hats.0.lock().ok().and_then(|h| h.get(&key).cloned()) {
+            return known;
+        }
+        let read = SIGNALS.get(signal);
+        let of = |d| read.map_or_else(Vec::new, |s| means(d, s, module));
+        let values: Vec<Vec<f64>> = self.drives.iter().map(of).collect();
+        let drives = self.drives.iter().zip(&values);
+        let mut valid: Vec<f64> = drives
+            .flat_map(|(d, x)| x.iter().zip(&d.valid[module as usize]))
+            .filter(|(x, ok)| **ok && x.is_finite())
+            .map(|(x, _)| *x)
+            .collect();
+        valid.sort_by(f64::total_cmp);
+        let at = |part: f64| valid.get((part * valid.len() as f64) as usize).copied();
+        let (lo, hi) = (at(TAIL).unwrap_or(0.0), at(1.0 - TAIL).unwrap_or(0.0));
+        let width = ((hi - lo) / (HATS - 1) as f64).max(1e-9);
+        let place = |x: &f64| {
+            let x = (x - lo) / width;
+            if x.is_finite() { x.clamp(0.0, (HATS - 1) as f64) } else { 0.0 }
+        };
+        let rows = values.iter().map(|x| x.iter().map(place).collect()).collect();
+        let knots = core::array::from_fn(|k| lo + k as f64 * width);
+        let places = Arc::new(Places { knots, rows });
+        if let Ok(mut known) = self.hats.0.lock() {
+            known.insert(key, places.clone());
+        }
+        places
+    }
+}
