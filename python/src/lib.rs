@@ -7,6 +7,7 @@
 //!
 //! Left out on purpose: everything that can be said in Python without loss.
 
+mod batch;
 mod decision;
 mod diagnose;
 mod drives;
@@ -29,6 +30,8 @@ const fn provenance(seed: u64) -> tractrix_core::Provenance {
 /// What `tractrix` is made of; not to be imported by users.
 #[pyo3::pymodule]
 mod _native {
+    #[pymodule_export]
+    use crate::batch::Batch;
     #[pymodule_export]
     use crate::diagnose::diagnose_json;
     #[pymodule_export]

@@ -9,6 +9,9 @@ Road frame: s along the route, d to the left of its reference line. The ego's re
 centre of the tractor's drive-axle group, on the ground.
 """
 
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
 from tractrix import drives
 from tractrix._diagnosis import diagnose
 from tractrix._fleet import diagnose_many
@@ -20,11 +23,15 @@ from tractrix._scenario import scenario, scenarios
 from tractrix._state import SCENE_DTYPE, Decision, Ego
 from tractrix._world import World
 
+if TYPE_CHECKING:
+    from tractrix._vector_env import VectorEnv
+
 __all__ = [
     "SCENE_DTYPE",
     "Decision",
     "Ego",
     "Snapshot",
+    "VectorEnv",
     "World",
     "__git_revision__",
     "__version__",
@@ -35,3 +42,21 @@ __all__ = [
     "scenario",
     "scenarios",
 ]
+
+if find_spec("gymnasium") is not None:
+    import gymnasium
+
+    gymnasium.register(
+        id="tractrix/Highway-v0",
+        entry_point="tractrix._gym:HighwayEnv",
+        vector_entry_point="tractrix._vector_env:VectorEnv",
+    )
+
+
+def __getattr__(name: str) -> Any:
+    """`VectorEnv` is there as soon as it is asked for: it needs Gymnasium (`tractrix[gym]`)."""
+    if name == "VectorEnv":
+        from tractrix._vector_env import VectorEnv
+
+        return VectorEnv
+    raise AttributeError(f"module 'tractrix' has no attribute {name!r}")

@@ -2,6 +2,9 @@
 
 from typing import Self
 
+import numpy as np
+import numpy.typing as npt
+
 VERSION: str
 GIT_REVISION: str
 
@@ -34,6 +37,37 @@ def drives_from_logs(
 ) -> str: ...
 
 class Snapshot: ...
+
+class Batch:
+    def __new__(
+        cls,
+        count: int,
+        scenarios: list[tuple[str, str | None]],
+        *,
+        road: str | None,
+        seed: int,
+        fidelity: str,
+        spec: str,
+        episode_s: float,
+        start_spread_m: float,
+        threads: int,
+    ) -> Self: ...
+    def observation_size(self) -> int: ...
+    def reset(self, seeds: list[int | None], which: list[bool]) -> None: ...
+    def step(self, actions: npt.NDArray[np.uint8]) -> None: ...
+    def read(
+        self,
+        obs: npt.NDArray[np.float32],
+        mask: npt.NDArray[np.uint8],
+        reward: npt.NDArray[np.float32],
+        terminated: npt.NDArray[np.uint8],
+        truncated: npt.NDArray[np.uint8],
+        final_obs: npt.NDArray[np.float32],
+    ) -> None: ...
+    def episodes(self) -> list[tuple[int, list[float]]]: ...
+    @staticmethod
+    def figures() -> list[str]: ...
+    def close(self) -> None: ...
 
 class World:
     def __new__(
