@@ -126,6 +126,35 @@ fn an_episode_ends_with_its_last_observation_and_begins_again_in_the_same_step()
     assert_eq!(arrays.obs, first, "the same seeds, the same bits");
 }
 
+/// What follows a seed hung on how many episodes had ended before it: the counter went on.
+#[test]
+fn what_follows_a_seed_does_not_hang_on_what_was_before() {
+    let spec = EnvSpec { episode_s: 3.0, ..spec("table2-medium-15", Fidelity::Kinematic) };
+    let mut batch = Batch::new(vec![spec], 5, 1).unwrap();
+    let mut arrays = Arrays::of(&batch);
+    let mut after_seven = |before: usize| {
+        batch.reset(Some(&[3]), &mut arrays.views()).unwrap();
+        for _ in 0..before {
+            batch.step(&[1], &mut arrays.views()).unwrap();
+        }
+        batch.reset(Some(&[7]), &mut arrays.views()).unwrap();
+        let mut kept = EnvSnapshot::default();
+        batch.save(0, &mut kept);
+        let mut drive = |batch: &mut Batch| -> Vec<Vec<u32>> {
+            let step = |_| {
+                batch.step(&[1], &mut arrays.views()).unwrap();
+                arrays.obs.iter().map(|x| x.to_bits()).collect()
+            };
+            (0..10).map(step).collect()
+        };
+        let first = drive(&mut batch);
+        batch.restore(0, &kept);
+        assert_eq!(first, drive(&mut batch));
+        first
+    };
+    assert_eq!(after_seven(0), after_seven(4));
+}
+
 #[test]
 fn a_kept_state_goes_on_with_the_same_bits() {
     for fidelity in [Fidelity::Kinematic, Fidelity::Truck] {

@@ -49,6 +49,9 @@ pub(super) struct State {
     pub(super) stats: EpisodeStats,
     maneuver: Maneuver,
     start_s_m: f64,
+    /// Where the seeds of the episodes are from, and how many have ended since.
+    stream: u64,
+    episode: u64,
 }
 
 /// A state kept for later; [`super::Batch::save`] fills it.
@@ -61,7 +64,6 @@ pub struct EnvSnapshot {
 pub(super) struct Env {
     shared: Arc<Shared>,
     index: u64,
-    episode: u64,
     pub(super) state: Option<State>,
 }
 
@@ -188,20 +190,26 @@ impl Shared {
 
 impl Env {
     pub(super) fn new(shared: Arc<Shared>, index: usize) -> Self {
-        Self { shared, index: index as u64, episode: 0, state: None }
+        Self { shared, index: index as u64, state: None }
     }
 
-    /// Begins an episode; without a seed the next of this environment's own.
+    /// Begins an episode: with a seed the first of that seed's, else the next one. What follows hangs
+    /// on the seed alone, not on what was driven before it.
     pub(super) fn reset(&mut self, batch_seed: u64, seed: Option<u64>) -> Result<(), SimError> {
-        let seed = seed.unwrap_or_else(|| mix(batch_seed, self.index, self.episode));
-        self.episode += 1;
+        let (stream, episode) = match (seed, &self.state) {
+            (Some(seed), _) => (seed, 0),
+            (None, Some(state)) => (state.stream, state.episode + 1),
+            (None, None) => (mix(batch_seed, self.index, 0), 0),
+        };
+        let seed = if episode == 0 { stream } else { mix(stream, 1, episode) };
         let former = self.state.take().map(|state| (state.body, state.observer));
         let (body, observer) = former.map_or((None, None), |(b, o)| (Some(b), Some(o)));
         let (body, start_s_m) = self.shared.body(seed, body)?;
         let mut observer = observer.unwrap_or_else(|| Observer::new(self.shared.spec.decision_s));
         observer.clear();
         let stats = EpisodeStats { seed, ..EpisodeStats::default() };
-        self.state = Some(State { body, observer, stats, maneuver: Maneuver::KeepLane, start_s_m });
+        let maneuver = Maneuver::KeepLane;
+        self.state = Some(State { body, observer, stats, maneuver, start_s_m, stream, episode });
         Ok(())
     }
 
