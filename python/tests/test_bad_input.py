@@ -29,7 +29,7 @@ import tractrix
         ({"road": "builtin:motorway"}, "builtin:motorway"),
         ({"seed": -1}, "seed = -1"),
         ({"seed": 2**64}, "seed = 18446744073709551616"),
-        ({"scenario": "nowhere"}, "highway"),
+        ({"scenario": "nowhere"}, 'no built-in scenario "nowhere"; the nearest are'),
         ({"scenario": ""}, "no built-in scenario"),
         ({"scenario": {}}, "missing field"),
         ({"scenario": {"schema": "one"}}, "schema|invalid type"),

@@ -83,12 +83,25 @@ impl Stack {
         limits: &VehicleLimits,
         policy: Option<Arc<Policy>>,
     ) -> Result<Self, PlannerError> {
-        let estimator = config.estimator;
-        let tactics = Tactics::new(config, policy)?;
+        config.check()?;
         limits.check()?;
+        let control = Control::new(&config, limits)?;
+        Self::assemble(config, limits, policy, control)
+    }
+
+    /// A frame of its own: what is copied here must not lie under the gain table, which is computed
+    /// before, on the stack of a small computer.
+    #[inline(never)]
+    fn assemble(
+        config: StackConfig,
+        limits: &VehicleLimits,
+        policy: Option<Arc<Policy>>,
+        control: Control,
+    ) -> Result<Self, PlannerError> {
+        let estimator = config.estimator;
         Ok(Self {
-            control: Control::new(tactics.config(), limits)?,
-            tactics,
+            tactics: Tactics::new(config, policy)?,
+            control,
             guard: GuardMemory::default(),
             ticks: 0,
             last_tick: None,
