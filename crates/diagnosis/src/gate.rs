@@ -26,15 +26,16 @@ const SHARED: f64 = 0.5;
 /// Part of the information about a cause in one drive above which no other drive can confirm it.
 const LONELY: f64 = 0.85;
 
-/// Information of every drive about a member's parameters, in their priors.
+/// Information of every drive about a member's sizes, in their priors: what it says of the cause as the
+/// catalogue has it, which a course of its own would cap.
 fn about(fit: &Fit, member: usize) -> Vec<f64> {
     let hyp = &CATALOGUE[fit.set[member]];
     let own: Vec<(usize, f64)> = (0..fit.free.len())
-        .filter(|j| hyp.params().any(|q| q == fit.free[*j]))
+        .filter(|j| hyp.sizes.contains(&fit.free[*j]))
         .map(|j| (j + 1, fit.free[j].spec().prior.powi(2)))
         .collect();
     let of = |g: &DMatrix<f64>| own.iter().map(|(j, v)| g[(*j, *j)] * v).sum();
-    fit.gram.per_drive.iter().map(of).collect()
+    fit.whole.per_drive.iter().map(of).collect()
 }
 
 impl dyn Evidence + '_ {
@@ -166,21 +167,31 @@ impl dyn Evidence + '_ {
         })
     }
 
-    /// Gain of the `i`-th member on unseen halves of the drives, nats.
+    /// Gain of the `i`-th member on unseen halves of the drives, nats. Its own course is not taken
+    /// out: what a half can take of it is no question of whether it is there.
     fn folds(&self, fit: &Fit, member: usize) -> f64 {
         if self.drives() < 2 {
             return f64::INFINITY;
         }
+        let keep: Vec<usize> = (0..=fit.free.len()).collect();
+        let others = fit.course.without(CATALOGUE[fit.set[member]].sizes);
+        let Some(gram) = others.taken_out(&fit.whole, &keep, &fit.theta, self.zero()) else {
+            return f64::NEG_INFINITY;
+        };
         let zero = self.zero();
         let sigma = prior(&fit.free);
-        let own: Vec<bool> =
-            fit.free.iter().map(|p| CATALOGUE[fit.set[member]].params().any(|q| q == *p)).collect();
-        let x0 = DVector::from_iterator(
-            fit.free.len(),
-            fit.free.iter().map(|p| fit.theta[*p as usize] - zero[*p as usize]),
-        );
-        let others: Vec<usize> = (0..own.len()).filter(|j| !own[*j]).collect();
-        let all: Vec<usize> = (0..own.len()).collect();
+        // Shapes stay where they are: with them a size of nothing is no effect, as it is not along
+        // the tangent of a threshold.
+        let sizes = fit.sizes();
+        let own = CATALOGUE[fit.set[member]].sizes;
+        let all: Vec<usize> =
+            (0..fit.free.len()).filter(|j| sizes.contains(&fit.free[*j])).collect();
+        let others: Vec<usize> =
+            all.iter().copied().filter(|j| !own.contains(&fit.free[*j])).collect();
+        let x0 = DVector::from_fn(fit.free.len(), |j, _| {
+            let p = fit.free[j];
+            if all.contains(&j) { fit.theta[p as usize] - zero[p as usize] } else { 0.0 }
+        });
         // Drives that say most about the member are dealt to the halves in turn; where one drive
         // alone says it (hot brakes once), no other can confirm it.
         let mut order: Vec<(usize, f64)> = about(fit, member).into_iter().enumerate().collect();
@@ -195,8 +206,8 @@ impl dyn Evidence + '_ {
         };
         let mut gain = 0.0;
         for fold in [false, true] {
-            let (a, b, _) = fit.gram.sum(|d| half(d) != fold);
-            let (at, bt, _) = fit.gram.sum(|d| half(d) == fold);
+            let (a, b, _) = gram.sum(|d| half(d) != fold);
+            let (at, bt, _) = gram.sum(|d| half(d) == fold);
             let (b, bt) = (&b + &a * &x0, &bt + &at * &x0);
             let score = |keep: &[usize]| -> Option<f64> {
                 let s: Vec<f64> = keep.iter().map(|j| sigma[*j]).collect();

@@ -34,7 +34,11 @@ pub(crate) struct Fit {
     /// What was known of them before.
     pub(crate) priors: Vec<Prior>,
     pub(crate) covariance: DMatrix<f64>,
+    /// Over residual and parameters, the courses of the causes taken out.
     pub(crate) gram: Gram,
+    /// The same and the hats of the courses, nothing taken out.
+    pub(crate) whole: Gram,
+    pub(crate) course: Course,
     /// Residual norm at the fit.
     pub(crate) norm: f64,
 }
@@ -188,6 +192,7 @@ struct Standing {
     /// In the metric of the courses at `theta`.
     cost: f64,
     gram: Gram,
+    whole: Gram,
     along: Along,
 }
 
@@ -221,17 +226,18 @@ impl dyn Evidence + '_ {
         self.fitted(set, free, at, zero_norm)
     }
 
-    /// Gram matrix over residual and parameters, the courses of sizes of `at` taken out.
-    fn seen(&self, free: &Free, theta: &Theta, along: &Along, at: &Theta) -> Option<Gram> {
-        let gram = self.gram_along(theta, &along.from, &along.directions);
+    /// Gram matrix over residual and parameters, the courses of sizes of `at` taken out, and the
+    /// whole one.
+    fn seen(&self, free: &Free, theta: &Theta, along: &Along, at: &Theta) -> Option<[Gram; 2]> {
+        let whole = self.gram_along(theta, &along.from, &along.directions);
         let keep: Vec<usize> = (0..=free.params.len()).collect();
-        along.course.taken_out(&gram, &keep, at, &free.zero)
+        Some([along.course.taken_out(&whole, &keep, at, &free.zero)?, whole])
     }
 
     fn stand(&self, free: &Free, theta: &Theta, along: Along) -> Option<Standing> {
-        let gram = self.seen(free, theta, &along, theta)?;
+        let [gram, whole] = self.seen(free, theta, &along, theta)?;
         let cost = free.cost(gram.total().2, theta);
-        Some(Standing { theta: *theta, cost, gram, along })
+        Some(Standing { theta: *theta, cost, gram, whole, along })
     }
 
     /// The common step with halving, or the newest member's alone where that leads further; none
@@ -242,7 +248,7 @@ impl dyn Evidence + '_ {
             let to = free.moved(&at.theta, step, factor);
             // Both ends of a step are compared in the metric of its beginning.
             let gram = self.seen(free, &to, &at.along, &at.theta);
-            let cost = gram.map_or(f64::INFINITY, |g| free.cost(g.total().2, &to));
+            let cost = gram.map_or(f64::INFINITY, |g| free.cost(g[0].total().2, &to));
             let curve = (&a * step).dot(step);
             let promised = 2.0 * factor * b.dot(step) - factor * factor * curve;
             Step { to, improved: at.cost - cost, promised }
@@ -286,6 +292,8 @@ impl dyn Evidence + '_ {
             priors: free.priors,
             covariance,
             gram: at.gram,
+            whole: at.whole,
+            course: at.along.course,
             norm,
         })
     }
