@@ -1,44 +1,17 @@
 //! The structured solver asks for memory only while its workspace grows.
-#![expect(unsafe_code, reason = "an allocator cannot be written without")]
 
+#[path = "support/counting.rs"]
+mod counting;
 #[path = "support/pcc/mod.rs"]
 mod support;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
+use counting::requests_of;
 use planner::pcc::model::drive_profile;
 use planner::pcc::solve::{
     CutModel, Linearisation, Solution, SolveStatus, Structured, Subproblem, Terminal, TimeRule,
 };
 use planner::pcc::trip::Trip;
 use support::{BANDS_KM_H, Engine, corpus, request, truck};
-
-thread_local! {
-    static REQUESTS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counting the requests of each thread.
-struct Counting;
-
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = REQUESTS.try_with(|r| r.set(r.get() + 1));
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn requests_of(run: impl FnOnce()) -> usize {
-    let before = REQUESTS.with(Cell::get);
-    run();
-    REQUESTS.with(Cell::get) - before
-}
 
 #[test]
 fn after_the_first_solve_neither_linearisation_nor_solution_allocates() {

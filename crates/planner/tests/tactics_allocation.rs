@@ -1,46 +1,19 @@
 //! Whether a lane change would be driven, and what a policy makes of an observation, are told
 //! without asking for memory.
-#![expect(unsafe_code, reason = "an allocator cannot be written without")]
 #![allow(clippy::unwrap_used)]
 
+#[path = "support/counting.rs"]
+mod counting;
 #[path = "support/data_sheet.rs"]
 mod data_sheet;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
+use counting::requests_of;
 use data_sheet::reference_limits;
 use planner::decider::Policy;
 use planner::decider::observation::{ObservationSpec, Observer, frame};
 use planner::{DeciderKind, LaneChoice, Situation, StackConfig, Tactics};
 use road::{Road, builtin};
 use tractrix_core::{EgoState, LaneChangeRefusal, Neighbour, Scene, Time, VehicleClass};
-
-thread_local! {
-    static REQUESTS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counting the requests of each thread.
-struct Counting;
-
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = REQUESTS.try_with(|r| r.set(r.get() + 1));
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn requests_of(run: impl FnOnce()) -> usize {
-    let before = REQUESTS.with(Cell::get);
-    run();
-    REQUESTS.with(Cell::get) - before
-}
 
 /// Twenty vehicles in each lane, 25 m apart; `room_m` around the ego is empty in the left lane.
 fn scene(road: &Road, s_m: f64, room_m: f64) -> Scene {
