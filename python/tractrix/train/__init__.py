@@ -1,0 +1,1 @@
+"""Training of lane-change policies; wants `pip install "tractrix[train]"` (PyTorch)."""
