@@ -13,6 +13,7 @@ mod diagnose;
 mod drives;
 mod ego;
 mod fault;
+mod policy;
 mod scenario;
 mod scene;
 mod world;
@@ -36,6 +37,8 @@ mod _native {
     use crate::diagnose::diagnose_json;
     #[pymodule_export]
     use crate::drives::drives_from_logs;
+    #[pymodule_export]
+    use crate::policy::{Policy, observation_hash};
     #[pymodule_export]
     use crate::scenario::{scenario_json, scenario_list};
     #[pymodule_export]

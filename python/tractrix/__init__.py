@@ -18,6 +18,7 @@ from tractrix._fleet import diagnose_many
 from tractrix._native import GIT_REVISION as __git_revision__
 from tractrix._native import VERSION as __version__
 from tractrix._native import Snapshot
+from tractrix._policy import Policy
 from tractrix._recording import read_run
 from tractrix._scenario import scenario, scenarios
 from tractrix._state import SCENE_DTYPE, Decision, Ego
@@ -30,6 +31,7 @@ __all__ = [
     "SCENE_DTYPE",
     "Decision",
     "Ego",
+    "Policy",
     "Snapshot",
     "VectorEnv",
     "World",

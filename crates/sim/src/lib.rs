@@ -82,4 +82,4 @@ pub use traffic_section::{
     Family, OnFailure, ReplaySection, SumoSection, SumoTimeouts, TrafficKind, TrafficSection,
 };
 pub use truck::Truck;
-pub use world::{Status, World, stack_of};
+pub use world::{Status, World, read_policy, stack_of};

@@ -323,7 +323,10 @@ pub fn stack_of(
 }
 
 /// Weights of the learned decider, with the `.json` beside them.
-fn read_policy(file: &Path) -> Result<planner::decider::Policy, SimError> {
+///
+/// # Errors
+/// [`SimError`] names the file that cannot be read or used.
+pub fn read_policy(file: &Path) -> Result<planner::decider::Policy, SimError> {
     let io = |path: &Path| {
         let path = path.to_owned();
         move |source| SimError::Io { path, source }

@@ -1,0 +1,65 @@
+//! A learned policy's forward pass, the one that drives the truck.
+
+use std::path::PathBuf;
+
+use planner::decider::observation::ObservationSpec;
+use pyo3::buffer::PyBuffer;
+use pyo3::prelude::*;
+
+use crate::fault::Fault;
+
+/// What the words for an environment's kind observe.
+const SPECS: [(&str, ObservationSpec); 2] =
+    [("ours", ObservationSpec::Tractrix1), ("paper", ObservationSpec::Paper216)];
+
+/// The hash of an observation that a policy's sidecar has to name.
+#[pyfunction]
+pub(crate) fn observation_hash(spec: &str) -> Result<String, Fault> {
+    let known = SPECS.iter().find(|(word, _)| *word == spec);
+    known
+        .map(|(_, of)| format!("{:016x}", of.hash()))
+        .ok_or_else(|| Fault::Value(format!("spec = {spec:?}: ours or paper")))
+}
+
+/// Weights with their sidecar.
+#[pyclass(frozen, module = "tractrix._native")]
+pub(crate) struct Policy {
+    inner: planner::decider::Policy,
+}
+
+#[pymethods]
+impl Policy {
+    /// Reads a file of weights and the `.json` beside it.
+    #[new]
+    fn new(py: Python<'_>, file: PathBuf) -> PyResult<Self> {
+        let inner = py.detach(|| sim::read_policy(&file)).map_err(|e| Fault::of_input(&e))?;
+        Ok(Self { inner })
+    }
+
+    /// The kind of environment that makes the policy's observation.
+    fn spec(&self) -> &'static str {
+        let known = SPECS.iter().find(|(_, of)| *of == self.inner.spec());
+        known.map_or("", |(word, _)| word)
+    }
+
+    /// Numbers in an observation.
+    fn observation_size(&self) -> usize {
+        self.inner.spec().size()
+    }
+
+    /// Writes the values of the actions, in output order, for rows of observations.
+    fn values(
+        &self,
+        py: Python<'_>,
+        observations: PyBuffer<f32>,
+        out: PyBuffer<f32>,
+    ) -> PyResult<()> {
+        let observations = observations.to_vec(py)?;
+        let values: Vec<f32> = py.detach(|| {
+            let mut scratch = self.inner.scratch();
+            let rows = observations.chunks_exact(self.observation_size());
+            rows.flat_map(|row| self.inner.values(row, &mut scratch)).collect()
+        });
+        out.copy_from_slice(py, &values)
+    }
+}
