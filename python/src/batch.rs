@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
-use sim::batch::{EnvSpec, EpisodeStats, Fidelity, Views};
+use sim::batch::{BasePolicy, Drivers, EnvSpec, EpisodeStats, Fidelity, RolloutSpec, Views};
 use sim::{Overrides, SimError};
 
 use crate::fault::Fault;
@@ -188,6 +188,51 @@ impl Batch {
         terminated.copy_from_slice(py, &inner.terminated)?;
         truncated.copy_from_slice(py, &inner.truncated)?;
         final_obs.copy_from_slice(py, &inner.final_obs)
+    }
+
+    /// Writes what each action is worth over keeping, 3 numbers per environment.
+    #[pyo3(signature = (out, *, base, horizon_s, rollouts, discount_frac_s, drivers))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of one call from Python")]
+    fn advantages(
+        &self,
+        py: Python<'_>,
+        out: PyBuffer<f32>,
+        base: &str,
+        horizon_s: f64,
+        rollouts: u32,
+        discount_frac_s: f64,
+        drivers: &str,
+    ) -> PyResult<()> {
+        let drivers = match drivers {
+            "true" => Drivers::True,
+            "forgotten" => Drivers::Forgotten,
+            other => {
+                let text = format!("drivers = {other:?}: true or forgotten");
+                return Err(Fault::Value(text).into());
+            }
+        };
+        let base = BasePolicy::named(base).map_err(|e| Fault::of_input(&e))?;
+        let spec = RolloutSpec { base, horizon_s, rollouts, discount_frac_s, drivers };
+        let advantages = self.with(py, |inner| {
+            let mut out = vec![0.0; inner.reward.len() * sim::batch::ACTIONS.len()];
+            inner.batch.advantages(&spec, &mut out).map_err(|e| Fault::of_input(&e))?;
+            Ok(out)
+        })?;
+        out.copy_from_slice(py, &advantages)
+    }
+
+    /// Writes what a decider would do, an action per environment.
+    fn wishes(&self, py: Python<'_>, decider: &str, out: PyBuffer<u8>) -> PyResult<()> {
+        let kind = match BasePolicy::named(decider).map_err(|e| Fault::of_input(&e))? {
+            BasePolicy::Decider(kind) => kind,
+            BasePolicy::Policy(_) => planner::DeciderKind::Dqn,
+        };
+        let wishes = self.with(py, |inner| {
+            let mut out = vec![0; inner.reward.len()];
+            inner.batch.wishes(kind, &mut out).map_err(|e| Fault::of_input(&e))?;
+            Ok(out)
+        })?;
+        out.copy_from_slice(py, &wishes)
     }
 
     /// Seed and figures of each episode.

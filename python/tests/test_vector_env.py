@@ -77,6 +77,39 @@ def test_without_copies_the_arrays_are_written_again() -> None:
     assert first is not copied.step(keep())[0]
 
 
+def test_advantages_leave_the_environments_as_they_are() -> None:
+    env, alone = (envs(8, scenario="table2-sparse-15", episode_s=60.0) for _ in "ab")
+    for one in (env, alone):
+        one.reset(seed=1)
+        for _ in range(20):
+            _, _, _, _, infos = one.step(keep(8))
+    mask = infos["action_mask"]
+    assert mask[:, 0].any()
+    for drivers in ("true", "forgotten"):
+        out = env.advantages("mobil", horizon_s=15.0, rollouts=2, drivers=drivers)
+        assert out.shape == (8, 3) and out.dtype == np.float32
+        assert (out[:, 1] == 0.0).all() and (np.isnan(out) == (mask == 0)).all()
+    assert (env.step(keep(8))[0] == alone.step(keep(8))[0]).all()
+    with pytest.raises(ValueError, match="drivers"):
+        env.advantages(drivers="known")
+    with pytest.raises(ValueError, match="decider fast"):
+        env.advantages("fast")
+
+
+def test_wishes_are_actions() -> None:
+    env = envs(6, scenario="table2-sparse-15", episode_s=200.0)
+    env.reset(seed=1)
+    assert (env.wishes("keep") == 1).all()
+    seen = set()
+    for _ in range(120):
+        wishes = env.wishes("rules:150")
+        seen |= set(wishes.tolist())
+        env.step(wishes)
+    assert {0, 1} <= seen <= {0, 1, 2}
+    with pytest.raises(ValueError, match="External"):
+        env.wishes("external")
+
+
 def test_what_cannot_be_is_named() -> None:
     env = envs()
     with pytest.raises(ValueError, match="reset begins one"):

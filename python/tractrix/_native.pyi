@@ -73,6 +73,17 @@ class Batch:
         truncated: npt.NDArray[np.uint8],
         final_obs: npt.NDArray[np.float32],
     ) -> None: ...
+    def advantages(
+        self,
+        out: npt.NDArray[np.float32],
+        *,
+        base: str,
+        horizon_s: float,
+        rollouts: int,
+        discount_frac_s: float,
+        drivers: str,
+    ) -> None: ...
+    def wishes(self, decider: str, out: npt.NDArray[np.uint8]) -> None: ...
     def episodes(self) -> list[tuple[int, list[float]]]: ...
     @staticmethod
     def figures() -> list[str]: ...

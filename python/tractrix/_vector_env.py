@@ -177,6 +177,49 @@ class VectorEnv(
             infos,
         )
 
+    def advantages(
+        self,
+        base: str = "keep",
+        *,
+        horizon_s: float = 30.0,
+        rollouts: int = 1,
+        discount_frac_s: float = 0.99,
+        drivers: str = "true",
+    ) -> npt.NDArray[np.float32]:
+        """What each action is worth over keeping the lane now, in seconds at the reference speed.
+
+        Every action that the gate passes is driven to the end from the same state, `base` deciding
+        after it; the environments stay as they are. Kinematic environments only.
+
+        Args:
+            base: `keep`, `rules:50`, `mobil`, or `dqn:FILE` with a learned policy's weights.
+            horizon_s: Length of a rollout, s.
+            rollouts: Rollouts per action, each with other draws of the traffic to come.
+            discount_frac_s: A reward is worth this part a second later.
+            drivers: `true`, those who drive (privileged: for a teacher or an upper bound), or
+                `forgotten`, the means of their classes who wish the speeds that they have.
+
+        Returns:
+            A row of left, keep, right per environment: 0 for keep, NaN for an action that the gate
+            does not pass and where the road ends within the horizon.
+        """
+        out = np.empty((self.num_envs, 3), np.float32)
+        self._native.advantages(
+            out,
+            base=base,
+            horizon_s=float(horizon_s),
+            rollouts=whole("rollouts", rollouts),
+            discount_frac_s=float(discount_frac_s),
+            drivers=drivers,
+        )
+        return out
+
+    def wishes(self, decider: str) -> npt.NDArray[np.uint8]:
+        """What `keep`, `rules:METRES` or `mobil` would do now, an action per environment."""
+        out = np.empty(self.num_envs, np.uint8)
+        self._native.wishes(decider, out)
+        return out
+
     def episodes(self) -> dict[str, npt.NDArray[Any]]:
         """Seed and figures of every environment's episode; of one that has just ended, at its end."""
         rows = self._native.episodes()

@@ -114,9 +114,9 @@ impl Overrides<'_> {
     }
 }
 
-/// `keep`, `mobil`, `external`, `rules:` with the paper's distance in metres, or `dqn:` with a file
-/// of weights.
-fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), SimError> {
+/// A decider and its file of weights by their words: `keep`, `mobil`, `external`, `rules:` with the
+/// paper's distance in metres, or `dqn:` with a file of weights.
+pub(crate) fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), SimError> {
     let kind = match text.split_once(':') {
         None if text == "keep" => DeciderKind::KeepLane,
         None if text == "mobil" => DeciderKind::Mobil(MobilConfig::default()),

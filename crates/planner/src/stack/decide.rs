@@ -38,26 +38,15 @@ impl Tactics {
         let wish = match self.config.decider {
             DeciderKind::External => core::mem::take(&mut self.wish),
             _ if !due || maneuver.maneuver() != Maneuver::KeepLane => LaneChoice::Keep,
-            kind => {
+            DeciderKind::Dqn => {
                 let view = self.view(at, maneuver.lane(), out.reference_speed_m_s);
-                let law = self.config.keep_right;
-                match kind {
-                    _ if lane_ends(&view) => leave_ending_lane(&view),
-                    DeciderKind::Rules { distance_m } => match rules(&view, distance_m) {
-                        LaneChoice::Keep if law => keep_right(&view, |_| distance_m, distance_m),
-                        wish => wish,
-                    },
-                    DeciderKind::Mobil(config) => match mobil(&view, &config) {
-                        LaneChoice::Keep if law => {
-                            let leaving = |v: f64| leaving_gap_m(&view, &config, v);
-                            keep_right(&view, leaving, REAR_HEADWAY_S * at.ego.speed_m_s)
-                        }
-                        wish => wish,
-                    },
-                    DeciderKind::Dqn => self.learned(maneuver, out, &view),
-                    DeciderKind::KeepLane | DeciderKind::External => LaneChoice::Keep,
+                if lane_ends(&view) {
+                    leave_ending_lane(&view)
+                } else {
+                    self.learned(maneuver, out, &view)
                 }
             }
+            kind => self.ruled(kind, maneuver, out),
         };
         if wish != LaneChoice::Keep {
             self.reason = Some(self.why(wish, maneuver.lane(), out));
@@ -65,6 +54,45 @@ impl Tactics {
             self.reason = None;
         }
         maneuver.request(wish, out).err().or(aborted)
+    }
+
+    /// What a decider would wish here, whoever decides in this truck: keep during a change, before
+    /// the first tick, and for the deciders that need more than the scene (`dqn`, `external`).
+    #[must_use]
+    pub fn wish_of(&self, kind: DeciderKind, at: &Situation<'_>) -> LaneChoice {
+        match (&self.maneuver, self.outlook(at)) {
+            (Some(maneuver), Some(out)) if maneuver.maneuver() == Maneuver::KeepLane => {
+                self.ruled(kind, maneuver, &out)
+            }
+            _ => LaneChoice::Keep,
+        }
+    }
+
+    /// The wish of a decider that needs the scene alone.
+    fn ruled(
+        &self,
+        kind: DeciderKind,
+        maneuver: &ManeuverPlanner,
+        out: &Outlook<'_>,
+    ) -> LaneChoice {
+        let at = out.at;
+        let view = self.view(at, maneuver.lane(), out.reference_speed_m_s);
+        let law = self.config.keep_right;
+        match kind {
+            _ if lane_ends(&view) => leave_ending_lane(&view),
+            DeciderKind::Rules { distance_m } => match rules(&view, distance_m) {
+                LaneChoice::Keep if law => keep_right(&view, |_| distance_m, distance_m),
+                wish => wish,
+            },
+            DeciderKind::Mobil(config) => match mobil(&view, &config) {
+                LaneChoice::Keep if law => {
+                    let leaving = |v: f64| leaving_gap_m(&view, &config, v);
+                    keep_right(&view, leaving, REAR_HEADWAY_S * at.ego.speed_m_s)
+                }
+                wish => wish,
+            },
+            DeciderKind::KeepLane | DeciderKind::Dqn | DeciderKind::External => LaneChoice::Keep,
+        }
     }
 
     fn view<'a>(&self, at: &Situation<'a>, lane: u16, reference_m_s: f64) -> View<'a> {

@@ -36,7 +36,7 @@ pub(super) struct Shared {
 
 /// What drives.
 #[derive(Clone)]
-enum Body {
+pub(super) enum Body {
     Kinematic(Box<Kinematic>),
     Truck(Box<World>),
 }
@@ -44,7 +44,7 @@ enum Body {
 /// What changes in an environment.
 #[derive(Clone)]
 pub(super) struct State {
-    body: Body,
+    pub(super) body: Body,
     observer: Observer,
     pub(super) stats: EpisodeStats,
     maneuver: Maneuver,
@@ -62,7 +62,7 @@ pub struct EnvSnapshot {
 
 /// An environment.
 pub(super) struct Env {
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
     index: u64,
     pub(super) state: Option<State>,
 }
@@ -262,7 +262,7 @@ impl Env {
     pub(super) fn observe(&mut self, out: &mut [f32], mask: &mut [u8]) -> Result<(), SimError> {
         let spec = self.shared.spec.observation;
         let State { body, observer, .. } = self.state.as_mut().ok_or_else(not_begun)?;
-        let mut write = |tactics: &Tactics, at: &Situation<'_>| {
+        body.look(|tactics, at| {
             let reference = |s_m: f64| tactics.reference_speed_m_s(s_m).unwrap_or(0.0);
             observer.push(frame(at.ego, at.scene, at.road, reference));
             let passes = [LaneChoice::Left, LaneChoice::Right]
@@ -272,15 +272,17 @@ impl Env {
                 Some(observed) => spec.write(&observed, out),
                 None => out.fill(0.0),
             }
-        };
-        match body {
-            Body::Kinematic(kinematic) => {
-                kinematic.look()?;
-                write(&kinematic.tactics, &kinematic.at());
-                Ok(())
-            }
-            Body::Truck(world) => world.look(write),
-        }
+        })
+    }
+
+    /// The same environment once more.
+    pub(super) fn copy(&self) -> Self {
+        Self { shared: Arc::clone(&self.shared), index: self.index, state: self.state.clone() }
+    }
+
+    /// Whether there is no more road.
+    pub(super) fn is_at_end(&self) -> bool {
+        self.state.as_ref().is_some_and(|state| state.is_at_end(&self.shared))
     }
 
     pub(super) fn world(&self) -> Option<&World> {
@@ -296,6 +298,22 @@ impl Env {
 
     pub(super) fn restore(&mut self, from: &EnvSnapshot) {
         self.state.clone_from(&from.state);
+    }
+}
+
+impl Body {
+    /// Looks around: what the tactics would do, from here.
+    pub(super) fn look<R>(
+        &mut self,
+        look: impl FnOnce(&Tactics, &Situation<'_>) -> R,
+    ) -> Result<R, SimError> {
+        match self {
+            Self::Kinematic(kinematic) => {
+                kinematic.look()?;
+                Ok(look(&kinematic.tactics, &kinematic.at()))
+            }
+            Self::Truck(world) => world.look(look),
+        }
     }
 }
 
@@ -355,7 +373,7 @@ impl Recorder for Seen {
     }
 }
 
-fn not_begun() -> SimError {
+pub(super) fn not_begun() -> SimError {
     SimError::Batch {
         what: "step",
         value: "an environment without an episode".to_owned(),

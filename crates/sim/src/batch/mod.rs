@@ -7,12 +7,14 @@
 //! | `kinematic` | the ego as a point on its path ([`Fidelity::Kinematic`]) |
 //! | `reward` | what a decision earns |
 //! | `stats` | what an episode came to |
+//! | `advantages` | what a change now is worth over keeping, by rollouts |
 //!
 //! An action is looked at by the safety gate like any wish; the mask says before what the gate will
 //! do. Threads share out whole environments: no result depends on their number. An episode that has
 //! ended begins again in the same step (`autoreset_mode` `SAME_STEP` of Gymnasium), its last
 //! observation is in [`Views::final_obs`].
 
+mod advantages;
 mod env;
 mod kinematic;
 mod reward;
@@ -24,6 +26,7 @@ use planner::decider::LaneChoice;
 use planner::decider::observation::ObservationSpec;
 use tractrix_core::{LaneChangeRefusal, Maneuver};
 
+pub use advantages::{BasePolicy, Drivers, RolloutSpec};
 pub use env::EnvSnapshot;
 use env::{Env, Shared};
 pub use reward::RewardConfig;
@@ -137,7 +140,7 @@ pub struct Batch {
     envs: Vec<Env>,
     seed: u64,
     threads: usize,
-    size: usize,
+    observation: ObservationSpec,
 }
 
 impl Batch {
@@ -173,7 +176,7 @@ impl Batch {
             };
             envs.push(Env::new(shared, index));
         }
-        Ok(Self { envs, seed, threads, size: observation.size() })
+        Ok(Self { envs, seed, threads, observation })
     }
 
     /// Number of environments.
@@ -191,7 +194,7 @@ impl Batch {
     /// Numbers in an observation.
     #[must_use]
     pub const fn observation_size(&self) -> usize {
-        self.size
+        self.observation.size()
     }
 
     /// The world of an environment with [`Fidelity::Truck`] that has begun.
@@ -291,7 +294,7 @@ impl Batch {
         out: &mut Views<'_>,
         work: impl Fn(usize, Row<'_>) -> Result<(), SimError> + Sync,
     ) -> Result<(), SimError> {
-        let size = self.size;
+        let size = self.observation.size();
         for (what, is, width) in [
             ("obs", out.obs.len(), size),
             ("mask", out.mask.len(), ACTIONS.len()),
@@ -303,7 +306,6 @@ impl Batch {
         ] {
             self.fits(what, is, width)?;
         }
-        let count = self.envs.len();
         let rows = self
             .envs
             .iter_mut()
@@ -316,34 +318,38 @@ impl Batch {
                 Row { env, obs, mask, reward, terminated, truncated, final_obs, episode }
             })
             .enumerate();
-        if self.threads == 1 {
-            for (i, row) in rows {
-                work(i, row)?;
-            }
-            return Ok(());
-        }
-        let mut rows = rows;
-        let share = count.div_ceil(self.threads);
-        let work = &work;
-        std::thread::scope(|scope| {
-            let mut running = Vec::with_capacity(self.threads);
-            loop {
-                let part: Vec<_> = rows.by_ref().take(share).collect();
-                if part.is_empty() {
-                    break;
-                }
-                running.push(
-                    scope.spawn(move || part.into_iter().try_for_each(|(i, row)| work(i, row))),
-                );
-            }
-            let mut outcome = Ok(());
-            for thread in running {
-                let done = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-                outcome = outcome.and(done);
-            }
-            outcome
-        })
+        share_out(self.threads, rows, |(i, row)| work(i, row))
     }
+}
+
+/// Does something with every item; each thread takes items that lie side by side. The error is that
+/// of the first item that has one.
+fn share_out<T: Send>(
+    threads: usize,
+    mut items: impl ExactSizeIterator<Item = T>,
+    work: impl Fn(T) -> Result<(), SimError> + Sync,
+) -> Result<(), SimError> {
+    if threads == 1 {
+        return items.try_for_each(work);
+    }
+    let share = items.len().div_ceil(threads);
+    let work = &work;
+    std::thread::scope(|scope| {
+        let mut running = Vec::with_capacity(threads);
+        loop {
+            let part: Vec<_> = items.by_ref().take(share).collect();
+            if part.is_empty() {
+                break;
+            }
+            running.push(scope.spawn(move || part.into_iter().try_for_each(work)));
+        }
+        let mut outcome = Ok(());
+        for thread in running {
+            let done = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+            outcome = outcome.and(done);
+        }
+        outcome
+    })
 }
 
 /// Well mixed bits of three numbers (the finaliser of `splitmix64`, Steele et al. 2014).

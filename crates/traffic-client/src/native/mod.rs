@@ -11,6 +11,7 @@ mod fleet;
 mod from_road;
 mod happenings;
 mod human;
+mod imagine;
 mod inflow;
 mod lanes;
 mod neighbours;

@@ -166,6 +166,18 @@ impl NativeTraffic {
         self.engine.reseed(seed);
     }
 
+    /// Takes away every vehicle that is not within this stretch of the road, m: less to move where
+    /// only the next seconds around a place count. The scene is that of the next call.
+    pub fn keep_within(&mut self, from_m: f64, to_m: f64) {
+        self.engine.keep_within(from_m, to_m);
+    }
+
+    /// Puts the mean of its class in the place of every driver, who wishes the speed that he has:
+    /// traffic as it is known to somebody who sees it and does not know who drives.
+    pub fn forget_drivers(&mut self) {
+        self.engine.forget_drivers();
+    }
+
     /// Memory of a vehicle, bytes: its state and what is worked out about it in a tick.
     #[must_use]
     pub fn bytes_per_vehicle() -> usize {
