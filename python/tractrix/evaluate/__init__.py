@@ -1,0 +1,1 @@
+"""Deciders compared in the same traffic: `python -m tractrix.evaluate --help`."""
