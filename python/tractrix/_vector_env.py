@@ -192,7 +192,7 @@ class VectorEnv(
         after it; the environments stay as they are. Kinematic environments only.
 
         Args:
-            base: `keep`, `rules:50`, `mobil`, or `dqn:FILE` with a learned policy's weights.
+            base: `keep`, `rules:50`, `mobil`, `rollout`, or `dqn:FILE` with a learned policy's weights.
             horizon_s: Length of a rollout, s.
             rollouts: Rollouts per action, each with other draws of the traffic to come.
             discount_frac_s: A reward is worth this part a second later.
@@ -215,7 +215,7 @@ class VectorEnv(
         return out
 
     def wishes(self, decider: str) -> npt.NDArray[np.uint8]:
-        """What `keep`, `rules:METRES` or `mobil` would do now, an action per environment."""
+        """What `keep`, `rules:50`, `mobil` or `rollout` would do now, an action per environment."""
         out = np.empty(self.num_envs, np.uint8)
         self._native.wishes(decider, out)
         return out

@@ -4,14 +4,14 @@
 //! |---|---|
 //! | `traffic` | `native`, `sumo`, `replay:FILE`, `none` |
 //! | `mode` | `pure`, `inter`, `re` (with a manifest), `rep` (recorded traffic) |
-//! | `decider` | `keep`, `rules:METRES`, `mobil`, `external`, `dqn:FILE` |
+//! | `decider` | `keep`, `rules:METRES`, `mobil`, `rollout`, `external`, `dqn:FILE` |
 //! | `speed_planner` | `cruise`, `predictive` |
 //! | `on_traffic_failure` | `stop`, `native` |
 
 use std::path::Path;
 
 use planner::DeciderKind;
-use planner::decider::MobilConfig;
+use planner::decider::{MobilConfig, RolloutConfig};
 use serde::Deserialize;
 use serde::de::value::{Error as ValueError, StrDeserializer};
 use traffic_client::Mode;
@@ -114,12 +114,13 @@ impl Overrides<'_> {
     }
 }
 
-/// A decider and its file of weights by their words: `keep`, `mobil`, `external`, `rules:` with the
+/// A decider and its file of weights by their words: `keep`, `mobil`, `rollout`, `external`, `rules:` with the
 /// paper's distance in metres, or `dqn:` with a file of weights.
 pub(crate) fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), SimError> {
     let kind = match text.split_once(':') {
         None if text == "keep" => DeciderKind::KeepLane,
         None if text == "mobil" => DeciderKind::Mobil(MobilConfig::default()),
+        None if text == "rollout" => DeciderKind::Rollout(RolloutConfig::default()),
         None if text == "external" => DeciderKind::External,
         Some(("dqn", file)) if !file.is_empty() => {
             return Ok((DeciderKind::Dqn, Some(file.to_owned())));
@@ -128,7 +129,8 @@ pub(crate) fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), 
             DeciderKind::Rules { distance_m: distance.parse().unwrap_or(f64::NAN) }
         }
         _ => {
-            let known = "keep, rules:50, rules:100, rules:150, mobil, external or dqn:FILE";
+            let known =
+                "keep, rules:50, rules:100, rules:150, mobil, rollout, external or dqn:FILE";
             return Err(refused("decider", text, &format!("expected {known}")));
         }
     };

@@ -58,7 +58,7 @@ impl MobilConfig {
 
 /// A driver of a class who wishes a speed, m/s. Tyres set no bound: how much too close a gap is
 /// counts, also beyond what they can do.
-fn driver(class: VehicleClass, wish_m_s: f64) -> Idm {
+pub(super) fn driver(class: VehicleClass, wish_m_s: f64) -> Idm {
     let (accel, decel, headway_s, standstill_m) = match class {
         VehicleClass::Truck => (0.6, 1.2, 1.6, 3.0),
         _ => (1.4, 2.0, 1.2, 2.0),
@@ -70,7 +70,7 @@ fn driver(class: VehicleClass, wish_m_s: f64) -> Idm {
 const TOUCH_M: f64 = 0.5;
 
 /// A driver's acceleration, m/s², behind a vehicle at a gap, m, with a speed, m/s, or freely.
-fn accel_m_s2(driver: &Idm, speed_m_s: f64, ahead: Option<(f64, f64)>) -> f64 {
+pub(super) fn accel_m_s2(driver: &Idm, speed_m_s: f64, ahead: Option<(f64, f64)>) -> f64 {
     let (gap_m, closing_m_s) =
         ahead.map_or((f64::INFINITY, 0.0), |(gap_m, ahead_m_s)| (gap_m, speed_m_s - ahead_m_s));
     driver.accel_m_s2(speed_m_s, f64::INFINITY, gap_m.max(TOUCH_M), closing_m_s)

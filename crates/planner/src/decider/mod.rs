@@ -5,6 +5,7 @@
 //! | `keep_right` | back to the right lane when it serves |
 //! | `rules` | the paper's rule with a distance |
 //! | `mobil` | MOBIL over the intelligent driver model |
+//! | `rollout` | what gets furthest, driven ahead on board |
 //! | `policy` | a learned policy's forward pass |
 //! | [`observation`] | what a learned policy sees |
 
@@ -12,6 +13,7 @@ mod keep_right;
 mod mobil;
 pub mod observation;
 mod policy;
+mod rollout;
 mod rules;
 #[cfg(test)]
 mod tests;
@@ -21,6 +23,8 @@ pub(crate) use keep_right::keep_right;
 pub use mobil::MobilConfig;
 pub(crate) use mobil::{leaving_gap_m, mobil};
 pub use policy::{Policy, Scratch};
+pub use rollout::RolloutConfig;
+pub(crate) use rollout::rollout;
 pub(crate) use rules::rules;
 
 use crate::PlannerError;
@@ -46,6 +50,8 @@ pub enum DeciderKind {
     },
     /// Minimising overall braking induced by lane changes (Kesting et al. 2007).
     Mobil(MobilConfig),
+    /// What gets furthest by driving keeping and each change ahead, from the scene alone.
+    Rollout(RolloutConfig),
     /// A learned policy, given to [`crate::Stack::with_policy`].
     Dqn,
     /// Wishes come from outside: [`crate::Stack::request_lane_change`].
@@ -63,6 +69,7 @@ impl DeciderKind {
                 config_in("decider.rules.distance_m", *distance_m, 5.0, 500.0)
             }
             Self::Mobil(config) => config.check(),
+            Self::Rollout(config) => config.check(),
             Self::KeepLane | Self::Dqn | Self::External => Ok(()),
         }
     }

@@ -5,8 +5,8 @@ use crate::decider::observation::{
     self, ObservationSpec, Observed, Observer, PROFILE_S, Seen, sees_anyone,
 };
 use crate::decider::{
-    DeciderKind, LaneChoice, View, keep_right, lane_ends, leave_ending_lane, leaving_gap_m, mobil,
-    rules,
+    DeciderKind, LaneChoice, MobilConfig, View, keep_right, lane_ends, leave_ending_lane,
+    leaving_gap_m, mobil, rollout, rules,
 };
 use crate::speed::power_reserve_w;
 use crate::steering::{ManeuverPlanner, Outlook};
@@ -91,6 +91,16 @@ impl Tactics {
                 }
                 wish => wish,
             },
+            DeciderKind::Rollout(config) => {
+                let passes = |choice| maneuver.would_pass(choice, out).is_ok();
+                match rollout(&view, &config, passes) {
+                    LaneChoice::Keep if law => {
+                        let leaving = |v: f64| leaving_gap_m(&view, &MobilConfig::default(), v);
+                        keep_right(&view, leaving, REAR_HEADWAY_S * at.ego.speed_m_s)
+                    }
+                    wish => wish,
+                }
+            }
             DeciderKind::KeepLane | DeciderKind::Dqn | DeciderKind::External => LaneChoice::Keep,
         }
     }
