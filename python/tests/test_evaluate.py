@@ -64,7 +64,7 @@ def test_every_decider_gets_the_same_traffic() -> None:
 def test_the_files_of_an_evaluation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["rules:50", "mobil", "rollout:keep"]
+    words = ["rules:50", "mobil", "imagined:keep"]
     scenarios = ["table2-sparse-12.5", "table2-sparse-15"]
     given = ["--seeds", "5", "--episode-s", "20", "--out", str(tmp_path)]
     main([*given, "--deciders", *words, "--scenarios", *scenarios])

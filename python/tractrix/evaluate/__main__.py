@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
         "--deciders",
         nargs="+",
         default=["rules:50", "rules:100", "rules:150", "mobil"],
-        help="keep, rules:METRES, mobil, dqn:FILE, rollout[:BASE], ceiling[:BASE]; "
+        help="keep, rules:METRES, mobil, rollout, dqn:FILE, imagined[:BASE], ceiling[:BASE]; "
         "the first is the reference",
     )
     parser.add_argument("--scenarios", nargs="+", default=list(TABLE2), help=" ")

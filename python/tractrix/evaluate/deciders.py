@@ -19,8 +19,8 @@ def decider(word: str) -> tuple[Decide, str]:
     """Who decides, and the `spec` of the environments that it wants.
 
     Args:
-        word: `keep`, `rules:METRES` and `mobil` as in the truck; `dqn:FILE`, a learned policy;
-            `rollout[:BASE]`, the change that imagined traffic of average drivers rewards most with
+        word: `keep`, `rules:METRES`, `mobil` and `rollout` as in the truck; `dqn:FILE`, a learned
+            policy; `imagined[:BASE]`, the change that imagined traffic of average drivers rewards most with
             `BASE` (`mobil`) deciding after it; `ceiling[:BASE]`, the same with the true drivers,
             which nobody on the road knows: an upper bound, not a competitor.
 
@@ -39,7 +39,7 @@ def decider(word: str) -> tuple[Decide, str]:
             return policy.choose(obs, mask if masked else np.ones_like(mask))
 
         return learned, policy.spec
-    if kind in ("rollout", "ceiling"):
+    if kind in ("imagined", "ceiling"):
         drivers = "true" if kind == "ceiling" else "forgotten"
 
         def imagined(env: VectorEnv, *_: Any) -> npt.NDArray[Any]:

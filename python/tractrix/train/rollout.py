@@ -1,0 +1,320 @@
+"""The default agent: a network fitted to what rollouts of the engine say a lane change is worth.
+
+    python -m tractrix.train.rollout --out runs/rollout --seed 1
+
+drives the six `table2-*` scenarios, asks in states with an open gate for the advantage of each change
+over keeping (`VectorEnv.advantages`) and regresses the network on it, keep being 0. The rollouts are
+with the true drivers: the teacher may know what the network cannot see. From the second round on the
+former network decides in the rollouts and on the road: policy iteration. The best network on the
+validation seeds is exported.
+
+A round begins with seeds of its own, so a training that goes on from the checkpoint of a round ends
+with the same bits as one that was never stopped. The same seed gives the same weights, whatever the
+number of environment threads.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import torch
+
+from tractrix import VectorEnv
+from tractrix.evaluate.drive import TABLE2, drive
+from tractrix.train.export import export
+from tractrix.train.network import QNetwork
+
+Array = npt.NDArray[Any]
+VALIDATION_SEED = 1_000_000
+"""First seed of the validation; those of the training are 64 random bits."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """What a training depends on."""
+
+    scenarios: tuple[str, ...] = TABLE2
+    """Scenarios; each weighs the same, however often its gate is open."""
+    seed: int = 1
+    """Seed of weights, exploration, order of the states and traffic."""
+    rounds: int = 5
+    """Rounds: drive and ask, then fit."""
+    first_base: str = "mobil"
+    """Who decides in the first round, in the rollouts and on the road."""
+    envs: int = 96
+    """Environments."""
+    episode_s: float = 300.0
+    """Length of an episode, s."""
+    decisions: int = 400
+    """Decisions that each environment drives in a round."""
+    ask_every: int = 4
+    """Decisions between two questions: states side by side are alike."""
+    explore_frac: float = 0.15
+    """Share of the decisions that are drawn among those that the gate passes."""
+    horizon_s: float = 40.0
+    """Length of a rollout, s."""
+    discount_frac_s: float = 0.99
+    """What is left of a reward's worth after a second."""
+    epochs: int = 30
+    """Passes over the states in a round."""
+    batch: int = 256
+    """States in an update."""
+    learning_rate: float = 1e-3
+    """Adam's step at the beginning of a round; it falls to a twentieth on a cosine."""
+    most_s: float = 3.0
+    """Advantages are cut here, s: how bad the worst change is does not matter."""
+    validate_every: int = 10
+    """Epochs between two validations."""
+    validation_seeds: int = 8
+    """Episodes of each scenario in a validation."""
+
+
+class Training:
+    """A training and its files in `out`.
+
+    Args:
+        settings: What it depends on.
+        out: Folder of `checkpoint.pt`, `curve.json` and the best `policy.safetensors`.
+        threads: Threads of the environments.
+        resume: Go on from the checkpoint in `out`.
+        tensorboard: Also write events for TensorBoard.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        out: Path,
+        *,
+        threads: int = 1,
+        resume: bool = False,
+        tensorboard: bool = False,
+    ) -> None:
+        torch.set_num_threads(1)
+        torch.use_deterministic_algorithms(True)
+        torch.manual_seed(settings.seed)
+        self.settings, self.out, self.threads = settings, out, threads
+        self.env = VectorEnv(
+            settings.envs,
+            settings.scenarios,
+            episode_s=settings.episode_s,
+            threads=threads,
+        )
+        size = int(np.prod(self.env.single_observation_space.shape or ()))
+        self.network = QNetwork(size)
+        self.obs = np.zeros((0, size), np.float32)
+        self.worth = np.zeros((0, 3), np.float32)
+        self.scenario = np.zeros(0, np.int64)
+        self.round, self.best, self.cpu_s = 0, -np.inf, 0.0
+        self.curve: list[dict[str, float]] = []
+        self.events: Any = None
+        out.mkdir(parents=True, exist_ok=True)
+        if resume:
+            self._load()
+        if tensorboard:
+            from torch.utils.tensorboard import SummaryWriter
+
+            self.events = SummaryWriter(out)
+
+    def run(self, until: int | None = None) -> None:
+        """Trains to the last round, or to `until`."""
+        last = self.settings.rounds if until is None else until
+        while self.round < last:
+            self._began_s = time.process_time() - self.cpu_s
+            rng = np.random.default_rng([self.settings.seed, self.round])
+            self._ask(rng)
+            self._fit(rng)
+            self.round += 1
+            self._save()
+
+    def act(self, obs: Array, mask: Array) -> Array:
+        """The best of what the gate passes."""
+        with torch.no_grad():
+            values = self.network(torch.from_numpy(obs)).numpy()
+        best: Array = np.where(mask, values, -np.inf).argmax(axis=1)
+        return best
+
+    def _ask(self, rng: np.random.Generator) -> None:
+        """Drives, and adds states with what changes are worth there."""
+        settings, env = self.settings, self.env
+        of = np.arange(settings.envs) % len(settings.scenarios)
+        seen: list[tuple[Array, Array, Array]] = []
+        with tempfile.TemporaryDirectory() as folder:
+            base = settings.first_base
+            if self.round > 0:
+                file = Path(folder) / "former.safetensors"
+                export(
+                    self.network,
+                    file,
+                    spec="ours",
+                    seeds=[],
+                    training={},
+                    evaluation={},
+                )
+                base = f"dqn:{file}"
+            obs, infos = env.reset(
+                seed=rng.integers(2**63, size=settings.envs).tolist()
+            )
+            for decision in range(1, settings.decisions + 1):
+                mask = infos["action_mask"].astype(np.bool_)
+                if decision % settings.ask_every == 0:
+                    worth = env.advantages(
+                        base,
+                        horizon_s=settings.horizon_s,
+                        discount_frac_s=settings.discount_frac_s,
+                    )
+                    known = (~np.isnan(worth)).sum(axis=1) > 1
+                    seen.append((obs[known], worth[known], of[known]))
+                if self.round > 0:
+                    actions = self.act(obs, mask)
+                else:
+                    actions = env.wishes(settings.first_base).astype(np.int64)
+                noise = np.where(mask, rng.random(mask.shape), -1.0).argmax(axis=1)
+                random = rng.random(settings.envs) < settings.explore_frac
+                obs, _, _, _, infos = env.step(np.where(random, noise, actions))
+        self.obs = np.concatenate([self.obs, *(one[0] for one in seen)])
+        self.worth = np.concatenate([self.worth, *(one[1] for one in seen)])
+        self.scenario = np.concatenate([self.scenario, *(one[2] for one in seen)])
+
+    def _fit(self, rng: np.random.Generator) -> None:
+        """Regresses the network on all states so far."""
+        settings, count = self.settings, len(self.obs)
+        share = np.bincount(self.scenario, minlength=len(settings.scenarios)) / count
+        weight = 1.0 / (share[self.scenario] * np.count_nonzero(share))
+        obs, known = torch.from_numpy(self.obs), torch.from_numpy(~np.isnan(self.worth))
+        wanted = torch.from_numpy(
+            np.nan_to_num(self.worth).clip(-settings.most_s, settings.most_s)
+        )
+        weights = torch.from_numpy(weight.astype(np.float32))[:, None] * known
+        adam = torch.optim.Adam(self.network.parameters(), settings.learning_rate)
+        updates = settings.epochs * -(-count // settings.batch)
+        done = 0
+        for epoch in range(1, settings.epochs + 1):
+            loss_sum = 0.0
+            for at in torch.from_numpy(rng.permutation(count)).split(settings.batch):
+                falls = 0.05 + 0.95 * 0.5 * (1.0 + np.cos(np.pi * done / updates))
+                adam.param_groups[0]["lr"] = settings.learning_rate * float(falls)
+                loss = torch.nn.functional.smooth_l1_loss(
+                    self.network(obs[at]), wanted[at], reduction="none"
+                )
+                loss = (loss * weights[at]).sum() / weights[at].sum()
+                adam.zero_grad()
+                loss.backward()
+                adam.step()
+                done += 1
+                loss_sum += float(loss.detach()) * len(at)
+            if epoch % settings.validate_every == 0 or epoch == settings.epochs:
+                self._tell(epoch, loss_sum / count, self._validate())
+
+    def _validate(self) -> dict[str, float]:
+        """Drives without exploration; the best so far is exported."""
+        settings = self.settings
+        seeds = range(VALIDATION_SEED, VALIDATION_SEED + settings.validation_seeds)
+        figures = drive(
+            lambda _, obs, mask: self.act(obs, mask.astype(np.bool_)),
+            settings.scenarios,
+            seeds,
+            episode_s=settings.episode_s,
+            threads=self.threads,
+        )
+        found = {
+            f"valid_{name}": float(figures[name].mean())
+            for name in ("reward_s", "delta_speed_frac", "lane_changes", "collided")
+        }
+        if found["valid_reward_s"] > self.best:
+            self.best = found["valid_reward_s"]
+            export(
+                self.network,
+                self.out / "policy.safetensors",
+                spec="ours",
+                seeds=[settings.seed],
+                training={
+                    "trainer": "rollout",
+                    "settings": dataclasses.asdict(settings),
+                    "round": self.round + 1,
+                    "states": len(self.obs),
+                },
+                evaluation={"seeds": list(seeds), **found},
+            )
+        return found
+
+    def _tell(self, epoch: int, loss: float, found: dict[str, float]) -> None:
+        self.cpu_s = time.process_time() - self._began_s
+        row = {"round": float(self.round + 1), "states": float(len(self.obs))}
+        row |= {"epoch": float(epoch), "loss": loss, **found, "cpu_s": self.cpu_s}
+        if not self.curve:
+            print(" ".join(f"{name:>13.13}" for name in row), file=sys.stderr)
+        self.curve.append(row)
+        print(" ".join(f"{value:13.5g}" for value in row.values()), file=sys.stderr)
+        (self.out / "curve.json").write_text(json.dumps(self.curve, indent=1) + "\n")
+        if self.events is not None:
+            for name, value in row.items():
+                self.events.add_scalar(name, value, len(self.curve))
+
+    def _save(self) -> None:
+        """Everything that the next round depends on; the old file stays until the new one is whole."""
+        state = {
+            "settings": dataclasses.asdict(self.settings),
+            "network": self.network.state_dict(),
+            "obs": torch.from_numpy(self.obs),
+            "worth": torch.from_numpy(self.worth),
+            "scenario": torch.from_numpy(self.scenario),
+            "round": self.round,
+            "best": float(self.best),
+            "curve": self.curve,
+            "cpu_s": self.cpu_s,
+        }
+        torch.save(state, self.out / "checkpoint.new")
+        (self.out / "checkpoint.new").replace(self.out / "checkpoint.pt")
+
+    def _load(self) -> None:
+        state = torch.load(self.out / "checkpoint.pt", weights_only=True)
+        of = dataclasses.asdict(self.settings)
+        if state["settings"] | {"rounds": of["rounds"]} != of:
+            raise ValueError(f"{self.out}: the checkpoint was trained otherwise")
+        self.network.load_state_dict(state["network"])
+        self.obs, self.worth = state["obs"].numpy(), state["worth"].numpy()
+        self.scenario = state["scenario"].numpy()
+        self.round, self.best = state["round"], state["best"]
+        self.curve, self.cpu_s = state["curve"], state["cpu_s"]
+
+
+def main() -> None:
+    """The command line: one option for every setting."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tractrix.train.rollout",
+        description="Trains a lane-change policy on rollout advantages.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    for field in dataclasses.fields(Settings):
+        default: Any = field.default
+        several = isinstance(default, tuple)
+        parser.add_argument(
+            "--" + field.name.replace("_", "-"),
+            type=str if several else type(default),
+            nargs="+" if several else None,
+            default=default,
+            help=" ",
+        )
+    parser.add_argument("--out", type=Path, required=True, help="folder of its files")
+    parser.add_argument("--threads", type=int, default=1, help="of the environments")
+    parser.add_argument("--resume", action="store_true", help="go on from --out")
+    parser.add_argument("--tensorboard", action="store_true", help="also write events")
+    given = vars(parser.parse_args())
+    own = {
+        name: given.pop(name) for name in ("out", "threads", "resume", "tensorboard")
+    }
+    given["scenarios"] = tuple(given["scenarios"])
+    Training(Settings(**given), own.pop("out"), **own).run()
+
+
+if __name__ == "__main__":
+    main()
