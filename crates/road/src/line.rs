@@ -170,6 +170,27 @@ impl Line {
         self.knot(&self.cells[self.cell(inside_m.clamp(0.0, self.length_m))], s_m)
     }
 
+    /// The station, clamped to the line, m, and the curvature there alone, 1/m: as [`Line::at`] at a
+    /// part of its cost.
+    #[must_use]
+    pub fn curvature_1_m(&self, s_m: f64) -> (f64, f64) {
+        let s = s_m.clamp(0.0, self.length_m);
+        let cell = &self.cells[self.cell(s)];
+        (s, cell.local(s - cell.s_m).curvature_1_m())
+    }
+
+    /// The height alone, m: as [`Line::at`] at a part of its cost.
+    #[must_use]
+    pub fn height_m(&self, s_m: f64) -> f64 {
+        self.elevation.at(s_m.clamp(0.0, self.length_m))
+    }
+
+    /// The slope dz/ds alone, dimensionless: as [`Line::at`] at a part of its cost.
+    #[must_use]
+    pub fn slope(&self, s_m: f64) -> f64 {
+        self.elevation.at_with_slope(s_m.clamp(0.0, self.length_m)).1
+    }
+
     fn knot(&self, cell: &Cell, s_m: f64) -> Knot {
         self.knot_and_tangent(cell, s_m).0
     }
@@ -182,9 +203,8 @@ impl Line {
 
     fn knot_and_tangent(&self, cell: &Cell, s_m: f64) -> (Knot, [f64; 2]) {
         let local = cell.local(s_m - cell.s_m);
-        let ([u, v], [du, dv], [ddu, ddv]) = (local.point, local.first, local.second);
-        let q = du * du + dv * dv;
-        let speed = libm::sqrt(q);
+        let ([u, v], [du, dv]) = (local.point, local.first);
+        let speed = libm::sqrt(du * du + dv * dv);
         let turned = if du > 0.0 { small::atan(dv / du) } else { libm::atan2(dv, du) };
         let (z_m, slope) = self.elevation.at_with_slope(s_m);
         let knot = Knot {
@@ -192,7 +212,7 @@ impl Line {
             x_m: cell.x_m + cell.cos * u - cell.sin * v,
             y_m: cell.y_m + cell.sin * u + cell.cos * v,
             heading_rad: cell.heading_rad + turned,
-            curvature_1_m: (du * ddv - dv * ddu) / (q * speed),
+            curvature_1_m: local.curvature_1_m(),
             z_m,
             slope,
             bank_rad: self.bank.at(s_m),

@@ -5,7 +5,7 @@
 
 use rustix::time::{ClockId, clock_gettime};
 use sim::Scenario;
-use sim::batch::{Batch, EnvSpec, EpisodeStats, Fidelity, SUBSTEP_S, Views};
+use sim::batch::{Batch, EnvSnapshot, EnvSpec, EpisodeStats, Fidelity, SUBSTEP_S, Views};
 
 /// CPU time of this thread, s.
 fn cpu_s() -> f64 {
@@ -50,14 +50,25 @@ fn main() {
         batch.step(&actions, &mut views).unwrap();
     }
     let spent_s = cpu_s() - began_s;
+    let mut kept = EnvSnapshot::default();
+    batch.save(0, &mut kept);
+    let copies = if fidelity == Fidelity::Kinematic { 10_000 } else { 100 };
+    let saved_s = cpu_s();
+    for _ in 0..copies {
+        batch.save(0, &mut kept);
+        batch.restore(0, &kept);
+    }
+    let copied_s = (cpu_s() - saved_s) / f64::from(copies);
     let steps = (count * decisions) as f64 * per_decision;
     println!(
         "{name}, {fidelity:?}, {count} environments: {:.0} steps of 0.1 s per CPU second, \
-         {:.1} us per step; reset {:.3} ms, the first {:.3} ms; {} changes",
+         {:.1} us per step; reset {:.3} ms, the first {:.3} ms; save and \
+         restore {:.2} us; {} changes",
         steps / spent_s,
         1e6 * spent_s / steps,
         1e3 * (began_s - first_s) / count as f64,
         1e3 * (first_s - start_s) / count as f64,
+        1e6 * copied_s,
         views.episodes.iter().map(|e| e.lane_changes).sum::<u32>(),
     );
 }

@@ -37,7 +37,6 @@
 //! ```
 
 pub mod batch;
-mod behind;
 mod bus_loop;
 mod collision;
 mod drivability;

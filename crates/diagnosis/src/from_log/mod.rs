@@ -20,7 +20,6 @@ mod collect;
 mod dbc;
 mod folder;
 mod grade;
-mod observable;
 mod place;
 mod signals;
 mod trips;

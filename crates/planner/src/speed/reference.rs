@@ -5,13 +5,15 @@
 
 use alloc::vec::Vec;
 
-use road::{LaneEnd, ProfilePoint, Road};
+use road::{LaneEnd, Road};
 use tractrix_core::{Geometry, SpeedPoint};
 
 /// Spacing of the reference, m.
 pub(super) const STEP_M: f64 = 10.0;
 /// Points of the reference: 500 m ahead.
 pub(super) const POINTS: usize = 51;
+/// Steps that a combination is long, at most.
+const LONGEST: usize = 10;
 /// Deceleration towards lower limits ahead, m/s².
 const APPROACH_DECEL_M_S2: f64 = 0.5;
 /// The truck stops so far before a lane's end, m: room to pull away and move over.
@@ -29,17 +31,27 @@ pub(crate) struct SpeedBounds {
 }
 
 /// Speed reference from a station on.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(crate) struct ReferenceSpeed {
     points: Vec<SpeedPoint>,
-    profile: Vec<ProfilePoint>,
     /// What limits, curves and the lane's end allow at the points, m/s.
     held_m_s: [f64; POINTS],
 }
 
 impl Default for ReferenceSpeed {
     fn default() -> Self {
-        Self { points: Vec::new(), profile: Vec::new(), held_m_s: [0.0; POINTS] }
+        Self { points: Vec::new(), held_m_s: [0.0; POINTS] }
+    }
+}
+
+impl Clone for ReferenceSpeed {
+    fn clone(&self) -> Self {
+        Self { points: self.points.clone(), held_m_s: self.held_m_s }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.points.clone_from(&from.points);
+        self.held_m_s = from.held_m_s;
     }
 }
 
@@ -55,26 +67,29 @@ impl ReferenceSpeed {
         bounds: &SpeedBounds,
         planned: impl Fn(f64) -> Option<f64>,
     ) {
-        let behind = libm::ceil(geometry.length_m() / STEP_M).clamp(0.0, 10.0) as usize;
-        self.profile.clear();
-        self.profile.resize(POINTS + behind, ProfilePoint::default());
-        road.profile(s_m - behind as f64 * STEP_M, STEP_M, &mut self.profile);
-        let cap = |p: &ProfilePoint| {
-            let curve = libm::sqrt(bounds.curve_accel_m_s2 / p.curvature_1_m.abs().max(1e-6));
+        let behind = libm::ceil(geometry.length_m() / STEP_M).clamp(0.0, LONGEST as f64) as usize;
+        let first_m = s_m - behind as f64 * STEP_M;
+        let cap = |k: usize| {
+            let (at_m, curvature_1_m) = road.line().curvature_1_m(first_m + k as f64 * STEP_M);
+            let curve = libm::sqrt(bounds.curve_accel_m_s2 / curvature_1_m.abs().max(1e-6));
             let limit = if bounds.obey_speed_limits {
-                road.lane_speed_limit_m_s(lane, p.s_m)
+                road.lane_speed_limit_m_s(lane, at_m)
             } else {
                 f64::INFINITY
             };
             curve.min(limit)
         };
+        let mut caps_m_s = [f64::INFINITY; POINTS + LONGEST];
+        for (k, cap_m_s) in caps_m_s.iter_mut().enumerate().take(POINTS + behind) {
+            *cap_m_s = cap(k);
+        }
         let lane_end_m = road
             .lanes()
             .get(usize::from(lane))
             .filter(|l| l.end != LaneEnd::Continues)
             .map_or(f64::INFINITY, |l| l.s_end_m - geometry.front_m - STOP_BEFORE_END_M);
         for (i, allowed) in self.held_m_s.iter_mut().enumerate() {
-            let held = self.profile[i..=i + behind].iter().map(cap).fold(f64::INFINITY, f64::min);
+            let held = caps_m_s[i..=i + behind].iter().copied().fold(f64::INFINITY, f64::min);
             *allowed = if s_m + (i as f64) * STEP_M < lane_end_m { held } else { 0.0 };
         }
         self.rise(s_m, |s| planned(s).unwrap_or(bounds.set_speed_m_s));
@@ -130,7 +145,7 @@ impl ReferenceSpeed {
 mod tests {
     use super::*;
     use crate::testing::reference_geometry;
-    use road::builtin;
+    use road::{ProfilePoint, builtin};
 
     /// What a truck in `lane` at `s_m` would drive without others, with this set speed, whatever a
     /// plan of 12 m/s makes of its reference.

@@ -352,8 +352,8 @@ impl Stack {
 fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
     let g = &limits.geometry;
     let length = g.length_m().max(1.0);
-    let front = road.at(ego.s_m + g.front_m, 0.0).z_m;
-    let rear = road.at(ego.s_m - g.rear_m(), 0.0).z_m;
+    let front = road.line().height_m(ego.s_m + g.front_m);
+    let rear = road.line().height_m(ego.s_m - g.rear_m());
     libm::atan((front - rear) / length)
 }
 

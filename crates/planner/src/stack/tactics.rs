@@ -57,7 +57,9 @@ pub struct TacticalPlan {
 }
 
 /// Decider, lane changes, car following and reference speed of one truck.
-#[derive(Debug, Clone)]
+///
+/// `clone_from` copies into the memory that is there; only a plan of the speed ahead is made anew.
+#[derive(Debug)]
 pub struct Tactics {
     pub(super) config: StackConfig,
     pub(super) maneuver: Option<ManeuverPlanner>,
@@ -79,6 +81,58 @@ pub struct Tactics {
     foreseen: Option<u64>,
     /// The speed part of the last plan; the controllers may run less often than the loop.
     last: Option<TacticalPlan>,
+}
+
+impl Clone for Tactics {
+    fn clone(&self) -> Self {
+        Self {
+            config: self.config.clone(),
+            maneuver: self.maneuver.clone(),
+            reference: self.reference.clone(),
+            ceiling: self.ceiling.clone(),
+            profile: self.profile.clone(),
+            speed: self.speed.clone(),
+            policy: self.policy.clone(),
+            scratch: self.scratch.clone(),
+            observer: self.observer.clone(),
+            ..*self
+        }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        // Destructured, so that no new part is forgotten.
+        let Self {
+            config,
+            maneuver,
+            reference,
+            ceiling,
+            profile,
+            speed,
+            speed_status,
+            wish,
+            reason,
+            policy,
+            scratch,
+            observer,
+            jam,
+            ticks,
+            foreseen,
+            last,
+        } = from;
+        self.config.clone_from(config);
+        self.maneuver.clone_from(maneuver);
+        self.reference.clone_from(reference);
+        self.ceiling.clone_from(ceiling);
+        self.profile.clone_from(profile);
+        if from.plans_ahead() {
+            self.speed.clone_from(speed);
+        }
+        self.policy.clone_from(policy);
+        self.scratch.clone_from(scratch);
+        self.observer.clone_from(observer);
+        (self.speed_status, self.wish, self.reason) = (*speed_status, *wish, *reason);
+        (self.jam, self.ticks, self.foreseen, self.last) = (*jam, *ticks, *foreseen, *last);
+    }
 }
 
 impl Tactics {
@@ -425,5 +479,6 @@ fn join_from(road: &Road, lane: u16, ego: &EgoState) -> LateralPath {
 
 /// The steepest descent within the stopping distance ahead, rad, not above zero.
 fn steepest_descent(road: &Road, s_m: f64) -> f64 {
-    (0..8).map(|i| libm::atan(road.line().at(s_m + 25.0 * f64::from(i)).slope)).fold(0.0, f64::min)
+    let slopes = (0..8).map(|i| road.line().slope(s_m + 25.0 * f64::from(i)));
+    libm::atan(slopes.fold(0.0, f64::min))
 }

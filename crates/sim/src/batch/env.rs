@@ -5,17 +5,15 @@ use std::sync::Arc;
 use dynamics::{TruckModel, TruckParameters};
 use planner::decider::observation::{Observer, frame};
 use planner::decider::{DeciderKind, LaneChoice};
-use planner::safety::RssConfig;
 use planner::{RatesConfig, Situation, StackConfig, Tactics};
 use road::Road;
-use tractrix_core::{Geometry, LaneChangeRefusal, Maneuver, Recorder, Tick, Vehicle};
+use tractrix_core::{LaneChangeRefusal, Maneuver, Recorder, Tick, Vehicle};
 use traffic_client::Mode;
 use traffic_client::native::{NativeSnapshot, NativeTraffic};
 
 use super::kinematic::Kinematic;
 use super::reward::RewardConfig;
 use super::{ACTIONS, EnvSpec, EpisodeStats, Fidelity, SUBSTEP_S, Substep, mix};
-use crate::behind::Behind;
 use crate::{EgoStart, SimError, SimTruck, Status, TrafficKind, World};
 
 /// Warmed traffic to begin with; arrivals, drivers to come and the start differ with the seed.
@@ -37,24 +35,51 @@ pub(super) struct Shared {
 }
 
 /// What drives.
-#[derive(Clone)]
 pub(super) enum Body {
     Kinematic(Box<Kinematic>),
     Truck(Box<World>),
 }
 
 /// What changes in an environment.
-#[derive(Clone)]
 pub(super) struct State {
     pub(super) body: Body,
     observer: Observer,
     pub(super) stats: EpisodeStats,
     maneuver: Maneuver,
-    behind: Behind,
     start_s_m: f64,
     /// Where the seeds of the episodes are from, and how many have ended since.
     stream: u64,
     episode: u64,
+}
+
+impl Clone for Body {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Kinematic(kinematic) => Self::Kinematic(kinematic.clone()),
+            Self::Truck(world) => Self::Truck(world.clone()),
+        }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        match (&mut *self, from) {
+            (Self::Kinematic(own), Self::Kinematic(other)) => (**own).clone_from(other),
+            (own, other) => *own = other.clone(),
+        }
+    }
+}
+
+impl Clone for State {
+    fn clone(&self) -> Self {
+        Self { body: self.body.clone(), observer: self.observer.clone(), ..*self }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        let Self { body, observer, stats, maneuver, start_s_m, stream, episode } = from;
+        self.body.clone_from(body);
+        self.observer.clone_from(observer);
+        (self.stats, self.maneuver, self.start_s_m) = (*stats, *maneuver, *start_s_m);
+        (self.stream, self.episode) = (*stream, *episode);
+    }
 }
 
 /// A state kept for later; [`super::Batch::save`] fills it.
@@ -100,6 +125,7 @@ impl Shared {
         scenario.stack.decider = DeciderKind::External;
         scenario.policy_file = None;
         scenario.run.duration_s = spec.episode_s + 1.0;
+        scenario.traffic.native.window = spec.window.or(scenario.traffic.native.window);
         scenario.check()?;
         let ticks = SUBSTEP_S / scenario.run.tick_s;
         if !whole(ticks) {
@@ -180,7 +206,7 @@ impl Shared {
             Some(Body::Kinematic(kinematic)) => kinematic,
             _ => Box::new(model.clone()),
         };
-        kinematic.tactics = model.tactics.clone();
+        kinematic.tactics.clone_from(&model.tactics);
         if let Some(start) = pool.get((mix(seed, 0, 1) % POOL) as usize) {
             kinematic.traffic.restore(start);
         }
@@ -212,9 +238,7 @@ impl Env {
         observer.clear();
         let stats = EpisodeStats { seed, ..EpisodeStats::default() };
         let maneuver = Maneuver::KeepLane;
-        let behind = Behind::default();
-        self.state =
-            Some(State { body, observer, stats, maneuver, behind, start_s_m, stream, episode });
+        self.state = Some(State { body, observer, stats, maneuver, start_s_m, stream, episode });
         Ok(())
     }
 
@@ -228,7 +252,7 @@ impl Env {
         let (mut collided, mut over) = (false, false);
         for k in 0..shared.substeps {
             let wished = if k == 0 { wish } else { LaneChoice::Keep };
-            let step = state.substep(wished, &shared)?;
+            let step = state.substep(wished, shared.ticks)?;
             refused |= wished != LaneChoice::Keep && step.refused.is_some();
             let is_new = step.maneuver != state.maneuver;
             state.maneuver = step.maneuver;
@@ -324,30 +348,19 @@ impl Body {
 
 impl State {
     /// Drives [`SUBSTEP_S`].
-    fn substep(&mut self, wish: LaneChoice, shared: &Shared) -> Result<Substep, SimError> {
-        let rss = &shared.spec.scenario.stack.rss;
-        let Self { body, behind, stats, .. } = self;
-        let world = match body {
-            Body::Kinematic(kinematic) => {
-                let step = kinematic.step(wish)?;
-                let Situation { now, ego, scene, limits, .. } = kinematic.at();
-                let geometry = &limits.geometry;
-                let brakes = behind.begins_to_brake(now, ego, scene, step.maneuver, geometry, rss);
-                stats.hard_braking_caused += u32::from(brakes);
-                return Ok(step);
-            }
+    fn substep(&mut self, wish: LaneChoice, ticks: u32) -> Result<Substep, SimError> {
+        let world = match &mut self.body {
+            Body::Kinematic(kinematic) => return kinematic.step(wish),
             Body::Truck(world) => world,
         };
         world.stack_mut().request_lane_change(wish);
-        let geometry = &world.truck().limits().geometry.clone();
-        let mut seen = Seen { last: None, behind, brake: 0, geometry, rss };
+        let mut seen = Seen(None);
         let mut first: Option<Substep> = None;
-        for _ in 0..shared.ticks {
+        for _ in 0..ticks {
             world.tick(&mut seen)?;
-            first = first.or(seen.last);
+            first = first.or(seen.0);
         }
-        stats.hard_braking_caused += seen.brake;
-        let (first, last) = match (first, seen.last) {
+        let (first, last) = match (first, seen.0) {
             (Some(first), Some(last)) => (first, last),
             _ => return Err(not_begun()),
         };
@@ -373,23 +386,13 @@ impl State {
     }
 }
 
-/// The last tick of a world, and how many began to brake behind the truck.
-struct Seen<'a> {
-    last: Option<Substep>,
-    behind: &'a mut Behind,
-    brake: u32,
-    geometry: &'a Geometry,
-    rss: &'a RssConfig,
-}
+/// The last tick of a world.
+struct Seen(Option<Substep>);
 
-impl Recorder for Seen<'_> {
+impl Recorder for Seen {
     fn record(&mut self, tick: &Tick<'_>) {
         let refused: Option<LaneChangeRefusal> = tick.plan.refusal;
-        let Tick { now, ego, scene, plan } = *tick;
-        let Self { behind, geometry, rss, .. } = self;
-        let brakes = behind.begins_to_brake(now, ego, scene, plan.maneuver, geometry, rss);
-        self.brake += u32::from(brakes);
-        self.last = Some(Substep {
+        self.0 = Some(Substep {
             speed_m_s: tick.ego.speed_m_s,
             reference_m_s: tick.plan.reference_speed_m_s,
             maneuver: tick.plan.maneuver,

@@ -22,8 +22,8 @@ const POWER_FROM_M_S: f64 = 4.0;
 /// Length of a step, ns.
 const SUBSTEP_NS: i64 = 100_000_000;
 
-/// A kinematic ego in native traffic.
-#[derive(Debug, Clone)]
+/// A kinematic ego in native traffic. `clone_from` copies into the memory that is there.
+#[derive(Debug)]
 pub(super) struct Kinematic {
     pub(super) road: Arc<Road>,
     pub(super) limits: Arc<VehicleLimits>,
@@ -31,6 +31,27 @@ pub(super) struct Kinematic {
     pub(super) tactics: Tactics,
     pub(super) ego: EgoState,
     pub(super) now: Time,
+}
+
+impl Clone for Kinematic {
+    fn clone(&self) -> Self {
+        Self {
+            road: Arc::clone(&self.road),
+            limits: Arc::clone(&self.limits),
+            traffic: self.traffic.clone(),
+            tactics: self.tactics.clone(),
+            ..*self
+        }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        let Self { road, limits, traffic, tactics, ego, now } = from;
+        self.road.clone_from(road);
+        self.limits.clone_from(limits);
+        self.traffic.clone_from(traffic);
+        self.tactics.clone_from(tactics);
+        (self.ego, self.now) = (*ego, *now);
+    }
 }
 
 impl Kinematic {

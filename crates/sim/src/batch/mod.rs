@@ -25,6 +25,7 @@ use std::sync::Arc;
 use planner::decider::LaneChoice;
 use planner::decider::observation::ObservationSpec;
 use tractrix_core::{LaneChangeRefusal, Maneuver};
+use traffic_client::native::WindowConfig;
 
 pub use advantages::{BasePolicy, Drivers, RolloutSpec};
 pub use env::EnvSnapshot;
@@ -65,10 +66,13 @@ pub struct EnvSpec {
     pub fidelity: Fidelity,
     /// The ego starts up to so far beyond the scenario's start, m, as the episode's seed says.
     pub start_spread_m: f64,
+    /// Beyond it vehicles act less often; `None`: as the scenario says.
+    pub window: Option<WindowConfig>,
 }
 
 impl EnvSpec {
-    /// Decisions of 1 s under the mask, our observation and reward, episodes of 600 s.
+    /// Decisions of 1 s under the mask, our observation and reward, episodes of 600 s; a kinematic
+    /// ego with a window.
     #[must_use]
     pub fn new(scenario: Scenario, fidelity: Fidelity) -> Self {
         Self {
@@ -79,6 +83,7 @@ impl EnvSpec {
             episode_s: 600.0,
             fidelity,
             start_spread_m: 0.0,
+            window: (fidelity == Fidelity::Kinematic).then(WindowConfig::default),
         }
     }
 

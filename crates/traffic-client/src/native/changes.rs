@@ -156,7 +156,7 @@ impl Engine {
             if room_m > 0.0 { closing * closing / (2.0 * room_m) } else { f64::INFINITY }
         };
         let can_stay_behind = |&i: &usize| fleet.occupies(i, need.lane) && needed(i) <= most;
-        let f = (0..fleet.len()).rev().find(can_stay_behind)?;
+        let f = self.near().rev().find(can_stay_behind)?;
         let seen = (rear_m, self.ego.speed_m_s);
         let taken = self.behind_that_m_s2(f, seen, fleet.mind[f].headway_frac);
         let follows = fleet.driver[f].idm.lesser_m_s2(self.free_m_s2(f, need.lane), taken);
@@ -179,11 +179,17 @@ impl Engine {
         })
     }
 
+    /// Does vehicle `i` think about a lane change, acting in this tick? Those beyond the window do
+    /// whenever they act.
+    pub(super) fn is_due(&self, i: usize) -> bool {
+        is_due(self.state.tick, self.state.fleet.id[i]) || !self.near().contains(&i)
+    }
+
     /// What driver `i` would do about his lane in this tick.
     pub(super) fn wish(&self, i: usize) -> Option<Wish> {
         let fleet = &self.state.fleet;
         let stays = fleet.is_changing(i) || fleet.driver[i].stop_s_m.is_finite();
-        if !is_due(self.state.tick, fleet.id[i]) || stays || fleet.clock_s[i] < 0.0 {
+        if !self.is_due(i) || stays || fleet.clock_s[i] < 0.0 {
             return None;
         }
         let options = match self.need(i) {

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use tractrix_core::VehicleClass;
 
 use super::human::HumanConfig;
+use super::window::WindowConfig;
 use crate::TrafficError;
 use crate::schedule::Schedule;
 
@@ -117,6 +118,9 @@ pub struct TrafficConfig {
     pub outflow_sigma_m_s: f64,
     /// Time between two independent draws of these speeds, s; in between they go over linearly.
     pub outflow_period_s: f64,
+    /// Vehicles beyond it act less often; `None`: all act in every tick.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<WindowConfig>,
     /// What drivers misjudge, get used to and remember.
     pub human: HumanConfig,
     /// Passenger cars.
@@ -210,6 +214,7 @@ impl Default for TrafficConfig {
             outflow_speed_m_s: None,
             outflow_sigma_m_s: 0.0,
             outflow_period_s: 20.0,
+            window: None,
             human: HumanConfig::default(),
             car,
             van,
@@ -317,6 +322,11 @@ impl TrafficConfig {
         ] {
             check(key.to_owned(), value, low, high);
         }
+        if let Some(window) = self.window {
+            let radius_m = self.scene_radius_m;
+            check("window.behind_m".to_owned(), window.behind_m, radius_m, 100_000.0);
+            check("window.ahead_m".to_owned(), window.ahead_m, radius_m, 100_000.0);
+        }
         for (key, value, low, high) in self.human.ranges() {
             check(key.to_owned(), value, low, high);
         }
@@ -353,6 +363,9 @@ impl TrafficConfig {
         }
         if let Err(TrafficError::Config { why }) = self.schedule.validate(None) {
             bad.push(why);
+        }
+        if self.window.is_some() && !self.schedule.is_empty() {
+            bad.push("window: not with incidents or changing demand".to_owned());
         }
         if bad.is_empty() { Ok(()) } else { Err(TrafficError::Config { why: bad.join("; ") }) }
     }

@@ -21,11 +21,22 @@ pub(crate) struct Span {
 }
 
 /// The ego in lane coordinates, spans sorted by their front.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, PartialEq, Default)]
 pub(crate) struct EgoSpans {
     spans: Vec<Span>,
     /// Speed along the road, m/s.
     pub(crate) speed_m_s: f64,
+}
+
+impl Clone for EgoSpans {
+    fn clone(&self) -> Self {
+        Self { spans: self.spans.clone(), speed_m_s: self.speed_m_s }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.spans.clone_from(&from.spans);
+        self.speed_m_s = from.speed_m_s;
+    }
 }
 
 /// A rectangle in road coordinates: corner list (s, d), m.

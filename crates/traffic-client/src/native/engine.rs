@@ -6,20 +6,22 @@
 //! (`+ - * /`, comparison) and `libm` touch the state, so the same seed gives the same bits on every
 //! machine. Sweeps over the fleet are done in pieces ([`super::workers`]).
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use driver_models::{Idm, ballistic};
 
 use super::boundary::Boundary;
-use super::changes::{DECISION_TICKS, EgoNeed, is_due};
+use super::changes::{DECISION_TICKS, EgoNeed, Wish, is_due};
 use super::config::{ClassConfig, TrafficConfig};
 use super::driver::Driver;
 use super::ego::EgoSpans;
 use super::fleet::Fleet;
 use super::happenings::{Block, Plot, Rushing};
-use super::human::Minds;
+use super::human::{Mind, Minds};
 use super::lanes::{LaneMap, NO_LANE};
 use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT, Seen};
+use super::window::{FAR_TICKS, Near, Stride};
 use super::workers::{InTurn, PIECE, Workers, in_pieces};
 
 /// Length of a tick, s.
@@ -29,6 +31,8 @@ const REST_S: f64 = 4.0;
 /// A driver takes the foot off the pedal for a lower limit ahead when it asks for this part of
 /// comfortable braking.
 const OFF_THE_PEDAL: f64 = 0.25;
+/// Room for so many wishes in a tick from the beginning.
+const WISHES: usize = 64;
 /// A vehicle stops this far before the end of its lane, m.
 const END_MARGIN_M: f64 = 2.0;
 
@@ -56,6 +60,8 @@ pub(crate) struct State {
     pub(crate) lane_changes: u64,
     /// What has happened so far.
     pub(crate) plot: Plot,
+    /// Who is near the ego, where a window is wanted.
+    pub(crate) near: Option<Near>,
 }
 
 impl Clone for State {
@@ -76,19 +82,26 @@ impl Clone for State {
         self.driven_m = from.driven_m;
         self.lane_changes = from.lane_changes;
         self.plot.clone_from(&from.plot);
+        self.near = from.near;
     }
 }
 
-/// The drivers' world.
-#[derive(Debug, Clone)]
+/// The drivers' world. A copy has the memory of a tick to itself.
+#[derive(Debug)]
 pub(crate) struct Engine {
     pub(crate) config: Arc<TrafficConfig>,
     pub(crate) map: Arc<LaneMap>,
     pub(crate) state: State,
     pub(crate) ego: EgoSpans,
+    /// Station of the ego, m; `None` before the first scene.
+    pub(crate) ego_s_m: Option<f64>,
     pub(crate) near: Neighbourhood,
     /// Accelerations before this tick's lane changes, m/s².
     pub(super) raw_a_m_s2: Vec<f64>,
+    /// Accelerations that vehicles do not exceed, to make room, m/s², and wishes to change lanes:
+    /// memory of a tick.
+    bounds: Vec<(usize, f64)>,
+    wishes: Vec<Wish>,
     /// Stations at which changes into each lane began in this tick, m.
     pub(super) begun_m: Vec<f64>,
     /// Speed beyond the end of the road per lane, m/s; empty where the road goes on free.
@@ -111,11 +124,75 @@ pub(crate) struct Engine {
     pub(super) rushing: Vec<Rushing>,
 }
 
+impl Clone for Engine {
+    fn clone(&self) -> Self {
+        let mut copy = Self::new(Arc::clone(&self.config), Arc::clone(&self.map));
+        copy.clone_from(self);
+        copy
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        // Destructured, so that no new part is forgotten.
+        let Self {
+            config,
+            map,
+            state,
+            ego,
+            ego_s_m,
+            near: _,
+            raw_a_m_s2: _,
+            bounds: _,
+            wishes: _,
+            begun_m: _,
+            beyond_m_s,
+            boundary,
+            ego_driver,
+            ego_need,
+            minds,
+            workers,
+            piece,
+            limit_m_s,
+            blocks,
+            rushing,
+        } = from;
+        self.config.clone_from(config);
+        self.map.clone_from(map);
+        self.state.clone_from(state);
+        self.ego.clone_from(ego);
+        self.beyond_m_s.clone_from(beyond_m_s);
+        self.boundary.clone_from(boundary);
+        self.workers.clone_from(workers);
+        self.blocks.clone_from(blocks);
+        self.rushing.clone_from(rushing);
+        (self.ego_s_m, self.ego_need, self.limit_m_s) = (*ego_s_m, *ego_need, *limit_m_s);
+        (self.ego_driver, self.minds, self.piece) = (*ego_driver, *minds, *piece);
+    }
+}
+
+/// A piece of the fleet, to be moved: station and speed, lane and target, clock and mind; driver and
+/// number; acceleration.
+type Chunk<'a> = (
+    (
+        ((&'a mut [f64], &'a mut [f64]), (&'a mut [u16], &'a mut [u16])),
+        (&'a mut [f64], &'a mut [Mind]),
+    ),
+    ((&'a [Driver], &'a [u64]), &'a [f64]),
+);
+
 /// What moving a piece gave.
 #[derive(Debug, Clone, Copy, Default)]
 struct Moved {
     driven_m: f64,
     somebody_leaves: bool,
+}
+
+impl Moved {
+    fn and(self, other: Self) -> Self {
+        Self {
+            driven_m: self.driven_m + other.driven_m,
+            somebody_leaves: self.somebody_leaves || other.somebody_leaves,
+        }
+    }
 }
 
 /// Has the vehicle left the road?
@@ -134,8 +211,11 @@ impl Engine {
             map,
             state: State { waiting, ..State::default() },
             ego: EgoSpans::default(),
+            ego_s_m: None,
             near: Neighbourhood::default(),
             raw_a_m_s2: Vec::new(),
+            bounds: Vec::with_capacity(WISHES),
+            wishes: Vec::with_capacity(WISHES),
             begun_m: Vec::new(),
             beyond_m_s: Vec::new(),
             boundary: None,
@@ -162,44 +242,78 @@ impl Engine {
         self.ego_need = self.ego_need();
         let workers = Arc::clone(&self.workers);
         let piece = self.piece;
-        self.find_neighbours(&*workers, piece);
+        let acting = self.settle();
+        self.find_neighbours(&*workers, piece, acting.clone());
         let mut raw = std::mem::take(&mut self.raw_a_m_s2);
-        raw.resize(self.state.fleet.len(), 0.0);
-        let all_bounds = in_pieces(&*workers, raw.chunks_mut(piece), |k, raw| {
-            let mut bounds = Vec::new();
-            for (i, a) in (k * piece..).zip(raw) {
+        self.state.fleet.fit(&mut raw, 0.0);
+        // Who does not act goes on as before.
+        let present = self.present();
+        for i in (present.start..acting.start).chain(acting.end..present.end) {
+            raw[i] = self.state.fleet.a_m_s2[i];
+        }
+        let first = acting.start;
+        let mut bounds = std::mem::take(&mut self.bounds);
+        let follow = |from: usize, raw: &mut [f64], bounds: &mut Vec<(usize, f64)>| {
+            for (i, a) in (from..).zip(raw) {
                 *a = self.follow_m_s2(i);
-                self.make_room(i, &mut bounds);
+                self.make_room(i, bounds);
             }
-            bounds
-        });
-        for (i, most_m_s2) in all_bounds.into_iter().flatten().chain(self.let_ego_in()) {
+        };
+        if acting.len() <= piece {
+            follow(first, &mut raw[acting.clone()], &mut bounds);
+        } else {
+            let pieces = raw[acting.clone()].chunks_mut(piece);
+            let parts = in_pieces(&*workers, pieces, |k, raw| {
+                let mut bounds = Vec::new();
+                follow(first + k * piece, raw, &mut bounds);
+                bounds
+            });
+            bounds.extend(parts.into_iter().flatten());
+        }
+        for (i, most_m_s2) in bounds.drain(..).chain(self.let_ego_in()) {
             raw[i] = raw[i].min(most_m_s2);
         }
         self.raw_a_m_s2 = raw;
+        self.bounds = bounds;
         let mut a_m_s2 = std::mem::take(&mut self.state.fleet.a_m_s2);
-        let wishes = in_pieces(&*workers, a_m_s2.chunks_mut(piece), |k, a_m_s2| {
-            let range = k * piece..k * piece + a_m_s2.len();
+        let mut wishes = std::mem::take(&mut self.wishes);
+        let wish = |from: usize, a_m_s2: &mut [f64], wishes: &mut Vec<Wish>| {
+            let range = from..from + a_m_s2.len();
             for (i, a) in range.clone().zip(a_m_s2) {
                 *a = self.possible_m_s2(i);
             }
-            range.rev().filter_map(|i| self.wish(i)).collect::<Vec<_>>()
-        });
+            wishes.extend(range.rev().filter_map(|i| self.wish(i)));
+        };
+        if acting.len() <= piece {
+            wish(first, &mut a_m_s2[acting], &mut wishes);
+        } else {
+            let parts = in_pieces(&*workers, a_m_s2[acting].chunks_mut(piece), |k, a_m_s2| {
+                let mut wishes = Vec::new();
+                wish(first + k * piece, a_m_s2, &mut wishes);
+                wishes
+            });
+            wishes.extend(parts.into_iter().rev().flatten());
+        }
         self.state.fleet.a_m_s2 = a_m_s2;
-        self.change_lanes(wishes.into_iter().rev().flatten());
+        self.change_lanes(wishes.drain(..));
+        self.wishes = wishes;
     }
 
-    fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize) {
+    fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize, acting: Range<usize>) {
         let (fleet, map, tick) = (&self.state.fleet, &*self.map, self.state.tick);
+        let (near, present) = (self.near(), self.present());
+        let range = if acting == near { present } else { acting };
         let eventful = !self.blocks.is_empty() || !self.rushing.is_empty();
         let looks_aside = |i: usize| {
             is_due(tick, fleet.id[i])
+                || !near.contains(&i)
                 || fleet.is_changing(i)
                 || fleet.driver[i].exit != NO_LANE
                 || map.ends_early(fleet.lane[i])
                 || eventful
         };
-        self.near.find(Seen { fleet, map, ego: &self.ego }, workers, piece, looks_aside);
+        let seen = Seen { fleet, map, ego: &self.ego };
+        self.near.find(seen, range, workers, piece, looks_aside);
     }
 
     /// The wanted acceleration as far as engine and tyres give it, m/s².
@@ -314,40 +428,54 @@ impl Engine {
 
     /// Moves every vehicle to the end of the tick, then lets vehicles out and in.
     pub(crate) fn commit(&mut self) {
-        let moved = self.move_all();
-        self.state.driven_m += moved.iter().map(|m| m.driven_m).sum::<f64>();
+        let (present, is_for_all) = (self.present(), self.is_for_all());
+        let mut ticks = 1;
+        let mut moved = self.move_on(present.clone(), Stride::TICK);
+        if is_for_all && self.state.near.is_some() {
+            ticks = FAR_TICKS;
+            moved = moved.and(self.move_on(0..present.start, Stride::FAR));
+            let ahead = present.end..self.state.fleet.len();
+            moved = moved.and(self.move_on(ahead, Stride::FAR));
+        }
+        self.state.driven_m += moved.driven_m;
         self.state.tick += 1;
         let fleet = &mut self.state.fleet;
-        fleet.sort();
-        if moved.iter().any(|m| m.somebody_leaves) {
+        if !is_for_all {
+            fleet.sort(present);
+            return;
+        }
+        fleet.sort(0..fleet.len());
+        if moved.somebody_leaves {
             let map = &self.map;
             fleet.retain(|f, i| !is_out(map, f.s_m[i], f.lane[i], &f.driver[i]));
         }
         match self.boundary.clone() {
             Some(boundary) => self.let_in_measured(&boundary),
-            None => self.let_in(),
+            None => self.let_in(ticks),
         }
     }
 
-    /// Moves every vehicle and lets every driver get used to things and judge anew.
-    fn move_all(&mut self) -> Vec<Moved> {
+    /// Moves a range of vehicles and lets their drivers get used to things and judge anew.
+    fn move_on(&mut self, r: Range<usize>, stride: Stride) -> Moved {
         let (map, minds, tick) = (&*self.map, self.minds, self.state.tick + 1);
-        let (fleet, piece) = (&mut self.state.fleet, self.piece);
-        let motion = fleet.s_m.chunks_mut(piece).zip(fleet.v_m_s.chunks_mut(piece));
-        let change = fleet.lane.chunks_mut(piece).zip(fleet.target.chunks_mut(piece));
-        let inside = fleet.clock_s.chunks_mut(piece).zip(fleet.mind.chunks_mut(piece));
-        let fixed = fleet.driver.chunks(piece).zip(fleet.id.chunks(piece));
-        let items = motion.zip(change).zip(inside).zip(fixed.zip(fleet.a_m_s2.chunks(piece)));
-        in_pieces(&*self.workers, items, |_, (((motion, change), inside), (fixed, a_m_s2))| {
+        let (f, piece) = (&mut self.state.fleet, self.piece);
+        let motion = f.s_m[r.clone()].chunks_mut(piece).zip(f.v_m_s[r.clone()].chunks_mut(piece));
+        let change = f.lane[r.clone()].chunks_mut(piece).zip(f.target[r.clone()].chunks_mut(piece));
+        let inside =
+            f.clock_s[r.clone()].chunks_mut(piece).zip(f.mind[r.clone()].chunks_mut(piece));
+        let fixed = f.driver[r.clone()].chunks(piece).zip(f.id[r.clone()].chunks(piece));
+        let is_one = r.len() <= piece;
+        let items = motion.zip(change).zip(inside).zip(fixed.zip(f.a_m_s2[r].chunks(piece)));
+        let go_on = |(((motion, change), inside), (fixed, a_m_s2)): Chunk<'_>| {
             let ((s_m, v_m_s), (lane, target), (clock_s, mind)) = (motion, change, inside);
             let (driver, id) = fixed;
             let mut moved = Moved::default();
             for i in 0..s_m.len() {
-                let (v, distance_m) = ballistic(v_m_s[i], a_m_s2[i], TICK_S);
+                let (v, distance_m) = ballistic(v_m_s[i], a_m_s2[i], stride.step_s);
                 v_m_s[i] = v;
                 s_m[i] += distance_m;
                 moved.driven_m += distance_m;
-                clock_s[i] += TICK_S;
+                clock_s[i] += stride.step_s;
                 if target[i] == NO_LANE {
                     clock_s[i] = clock_s[i].min(0.0);
                 } else if clock_s[i] >= driver[i].lane_change_s {
@@ -355,14 +483,23 @@ impl Engine {
                     target[i] = NO_LANE;
                     clock_s[i] = -REST_S;
                 }
-                minds.relax(&mut mind[i]);
-                if is_due(tick, id[i]) {
+                if stride.is_far {
+                    minds.relax_far(&mut mind[i]);
+                } else {
+                    minds.relax(&mut mind[i]);
+                }
+                if stride.is_far || is_due(tick, id[i]) {
                     minds.judge(&mut mind[i], id[i], tick);
                 }
                 moved.somebody_leaves |= is_out(map, s_m[i], lane[i], &driver[i]);
             }
             moved
-        })
+        };
+        if is_one {
+            return items.map(go_on).fold(Moved::default(), Moved::and);
+        }
+        let parts = in_pieces(&*self.workers, items, |_, item| go_on(item));
+        parts.into_iter().fold(Moved::default(), Moved::and)
     }
 
     /// Memory of a vehicle, bytes: state, acceleration before lane changes, neighbours.
@@ -375,7 +512,8 @@ impl Engine {
     pub(crate) fn min_gap_m(&self) -> f64 {
         let fleet = &self.state.fleet;
         let mut least = f64::INFINITY;
-        for i in 0..fleet.len() {
+        let known = self.near.lanes.len().min(self.near().end);
+        for i in self.near().start..known {
             for side in [OWN, LEFT, RIGHT] {
                 let (lane, leader) = (self.near.lanes[i][side], self.near.leader[i][side]);
                 if leader < EGO && lane != NO_LANE && fleet.occupies(i, lane) {

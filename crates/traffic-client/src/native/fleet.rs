@@ -3,6 +3,8 @@
 //! `clone_from` copies into the arrays that are there, so a snapshot or a restore is a handful of
 //! memory copies and no allocation.
 
+use std::ops::Range;
+
 use super::driver::Driver;
 use super::human::Mind;
 use super::lanes::NO_LANE;
@@ -35,6 +37,7 @@ impl Clone for Fleet {
     fn clone(&self) -> Self {
         let mut copy = Self::default();
         copy.clone_from(self);
+        copy.make_room(self.len() / 4 + 16);
         copy
     }
 
@@ -58,6 +61,25 @@ impl Fleet {
         + size_of::<u64>()
         + size_of::<Driver>()
         + size_of::<Mind>();
+
+    /// Memory for so many more.
+    pub(crate) fn make_room(&mut self, more: usize) {
+        self.s_m.reserve(more);
+        self.v_m_s.reserve(more);
+        self.a_m_s2.reserve(more);
+        self.lane.reserve(more);
+        self.target.reserve(more);
+        self.clock_s.reserve(more);
+        self.id.reserve(more);
+        self.driver.reserve(more);
+        self.mind.reserve(more);
+    }
+
+    /// Gives what is worked out about each vehicle its length, with the fleet's room to grow.
+    pub(crate) fn fit<T: Clone>(&self, values: &mut Vec<T>, value: T) {
+        values.reserve(self.s_m.capacity().saturating_sub(values.len()));
+        values.resize(self.len(), value);
+    }
 
     pub(crate) fn len(&self) -> usize {
         self.s_m.len()
@@ -113,11 +135,11 @@ impl Fleet {
         self.mind.truncate(kept);
     }
 
-    /// Restores the order after a step. Insertion sort: in one step few vehicles overtake.
-    pub(crate) fn sort(&mut self) {
-        for i in 1..self.len() {
+    /// Restores the order of a range after a step. Insertion sort: in one step few vehicles overtake.
+    pub(crate) fn sort(&mut self, range: Range<usize>) {
+        for i in range.start + 1..range.end {
             let mut j = i;
-            while j > 0 && self.is_ahead(j - 1, j) {
+            while j > range.start && self.is_ahead(j - 1, j) {
                 self.swap(j - 1, j);
                 j -= 1;
             }

@@ -117,6 +117,8 @@ pub(crate) struct Minds {
     memory: (f64, f64),
     /// Part of the way back to the own headway in a tick.
     relaxes_frac: f64,
+    /// The same between two decisions.
+    far_relaxes_frac: f64,
     keep_lane_ticks: u64,
 }
 
@@ -127,6 +129,8 @@ impl Minds {
             seed,
             memory: config.memory(decision_ticks as f64 * tick_s),
             relaxes_frac: (tick_s / config.relaxation_s).min(1.0),
+            far_relaxes_frac: 1.0
+                - libm::exp(-(decision_ticks as f64) * tick_s / config.relaxation_s),
             keep_lane_ticks: (config.keep_lane_s / tick_s) as u64,
         }
     }
@@ -146,6 +150,11 @@ impl Minds {
     /// A tick of getting used to the own headway again.
     pub(crate) fn relax(&self, mind: &mut Mind) {
         mind.headway_frac += self.relaxes_frac * (1.0 - mind.headway_frac);
+    }
+
+    /// The time between two decisions of getting used to the own headway again.
+    pub(super) fn relax_far(&self, mind: &mut Mind) {
+        mind.headway_frac += self.far_relaxes_frac * (1.0 - mind.headway_frac);
     }
 
     /// Shortest headway over the own one that is accepted in a needed change.

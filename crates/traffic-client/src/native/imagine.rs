@@ -14,6 +14,8 @@ impl Engine {
     /// Takes away who is not within this stretch, m.
     pub(super) fn keep_within(&mut self, from_m: f64, to_m: f64) {
         self.state.fleet.retain(|fleet, i| fleet.s_m[i] >= from_m && fleet.rear_m(i) <= to_m);
+        // Who is near the ego has other places in the fleet now: all act next.
+        self.state.near = None;
     }
 
     /// Puts the mean of its class in the place of every driver, who wishes the speed that he has

@@ -95,14 +95,17 @@ impl Engine {
         }
     }
 
-    /// Draws this tick's arrivals and lets in whom the traffic has room for.
-    pub(crate) fn let_in(&mut self) {
+    /// Draws the arrivals of the last `ticks` and lets in whom the traffic has room for.
+    pub(crate) fn let_in(&mut self, ticks: u64) {
         for k in 0..self.map.lanes.len() {
             let Some(probability) = self.arrival_probability(k as u16) else { continue };
-            let draws = Draws::new(self.config.seed, Stream::Arrival, self.state.tick);
-            if draws.uniform(k as u32) < probability {
-                self.state.arrived += 1;
-                self.state.waiting[k] = self.state.waiting[k].saturating_add(1);
+            for ago in (0..ticks).rev() {
+                let tick = self.state.tick.saturating_sub(ago);
+                let draws = Draws::new(self.config.seed, Stream::Arrival, tick);
+                if draws.uniform(k as u32) < probability {
+                    self.state.arrived += 1;
+                    self.state.waiting[k] = self.state.waiting[k].saturating_add(1);
+                }
             }
             if self.state.waiting[k] > 0 && self.enter(k as u16) {
                 self.state.waiting[k] -= 1;

@@ -19,6 +19,7 @@ mod publish;
 mod rim;
 mod source;
 mod takeover;
+mod window;
 mod workers;
 
 pub use boundary::Boundary;
@@ -31,6 +32,7 @@ pub use lanes::LaneMap;
 pub(crate) use publish::carry_on;
 pub use source::{NativeCounts, NativeSnapshot, NativeTraffic};
 pub(crate) use takeover::stopping_gap_m;
+pub use window::WindowConfig;
 pub use workers::{InTurn, Piece, Workers};
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub(crate) const NOBODY: u32 = u32::MAX;
 pub(crate) const EGO: u32 = u32::MAX - 1;
 
 /// Neighbours of every vehicle, by index into the fleet. Scratch: not part of the state.
-#[derive(Debug, Default, Clone)]
+#[derive(Debug, Default)]
 pub(crate) struct Neighbourhood {
     /// Lane tracks: own, left, right ([`NO_LANE`] if there is none here).
     pub(crate) lanes: Vec<[u16; 3]>,
@@ -27,6 +27,16 @@ pub(crate) struct Neighbourhood {
     pub(crate) leader: Vec<[u32; 3]>,
     /// Nearest vehicle whose front is behind.
     pub(crate) follower: Vec<[u32; 3]>,
+    /// Nearest ahead and behind in each lane: memory of a sweep.
+    ahead: Vec<u32>,
+    behind: Vec<u32>,
+}
+
+/// What a sweep over a piece finds.
+struct Found<'a> {
+    lanes: &'a mut [[u16; 3]],
+    leader: &'a mut [[u32; 3]],
+    follower: &'a mut [[u32; 3]],
 }
 
 /// What a sweep goes over.
@@ -39,30 +49,42 @@ pub(super) struct Seen<'a> {
 
 impl Neighbourhood {
     /// Finds the neighbours in the own lane, and in the lanes beside of those who `look_aside`
-    /// (the others get [`NO_LANE`] there); the fleet is sorted. Of more than one piece, each first
-    /// tells who is nearest to its ends, so that the sweep over the next one can begin with them.
+    /// (the others get [`NO_LANE`] there), over a range of the sorted fleet. Of more than one piece,
+    /// each first tells who is nearest to its ends, so that the sweep over the next one can begin with them.
     pub(super) fn find(
         &mut self,
         seen: Seen<'_>,
+        over: Range<usize>,
         workers: &dyn Workers,
         piece: usize,
         look_aside: impl Fn(usize) -> bool + Sync,
     ) {
-        let n = seen.fleet.len();
-        self.lanes.resize(n, [NO_LANE; 3]);
-        self.leader.resize(n, [NOBODY; 3]);
-        self.follower.resize(n, [NOBODY; 3]);
+        seen.fleet.fit(&mut self.lanes, [NO_LANE; 3]);
+        seen.fleet.fit(&mut self.leader, [NOBODY; 3]);
+        seen.fleet.fit(&mut self.follower, [NOBODY; 3]);
+        let (first, n) = (over.start, over.len());
         // NO_LANE looks at the spare last entry, which stays NOBODY.
-        let nobody = vec![NOBODY; seen.map.lanes.len() + 1];
-        let mut ends = Vec::new();
-        if n > piece {
-            ends = in_pieces(workers, ranges(n, piece), |_, range| {
-                let (mut ahead, mut behind) = (nobody.clone(), nobody.clone());
-                seen.visit_front_first(range.clone(), &mut ahead, |_, _| {});
-                seen.visit_back_first(range, &mut behind, |_, _| {});
-                (ahead, behind)
-            });
+        let tracks = seen.map.lanes.len() + 1;
+        if n <= piece {
+            for nearest in [&mut self.ahead, &mut self.behind] {
+                nearest.clear();
+                nearest.resize(tracks, NOBODY);
+            }
+            let found = Found {
+                lanes: &mut self.lanes[over.clone()],
+                leader: &mut self.leader[over.clone()],
+                follower: &mut self.follower[over],
+            };
+            seen.sweep(first, found, &mut self.ahead, &mut self.behind, &look_aside);
+            return;
         }
+        let nobody = vec![NOBODY; tracks];
+        let ends = in_pieces(workers, ranges(over.clone(), piece), |_, range| {
+            let (mut ahead, mut behind) = (nobody.clone(), nobody.clone());
+            seen.visit_front_first(range.clone(), &mut ahead, |_, _| {});
+            seen.visit_back_first(range, &mut behind, |_, _| {});
+            (ahead, behind)
+        });
         let pieces = n.div_ceil(piece);
         let (mut ahead, mut behind) = (vec![nobody.clone(); pieces], vec![nobody; pieces]);
         for k in (1..pieces).rev() {
@@ -71,28 +93,13 @@ impl Neighbourhood {
         for k in 1..pieces {
             behind[k] = nearer(&behind[k - 1], &ends[k - 1].1);
         }
-        let lanes = self.lanes.chunks_mut(piece);
-        let found = self.leader.chunks_mut(piece).zip(self.follower.chunks_mut(piece));
+        let lanes = self.lanes[over.clone()].chunks_mut(piece);
+        let leader = self.leader[over.clone()].chunks_mut(piece);
+        let found = leader.zip(self.follower[over].chunks_mut(piece));
         let items = lanes.zip(found).zip(ahead.into_iter().zip(behind));
         in_pieces(workers, items, |k, ((lanes, (leader, follower)), (mut ahead, mut behind))| {
-            let from = k * piece;
-            let range = from..from + lanes.len();
-            for (i, lanes) in range.clone().zip(lanes.iter_mut()) {
-                let lane = seen.fleet.lane[i];
-                let (left, right) = if look_aside(i) {
-                    seen.map.beside(lane, seen.fleet.s_m[i])
-                } else {
-                    (NO_LANE, NO_LANE)
-                };
-                *lanes = [lane, left, right];
-            }
-            // From the front: the last one seen in a lane is the leader of the next one.
-            seen.visit_front_first(range.clone(), &mut ahead, |i, nearest| {
-                leader[i - from] = look(lanes[i - from], nearest);
-            });
-            seen.visit_back_first(range, &mut behind, |i, nearest| {
-                follower[i - from] = look(lanes[i - from], nearest);
-            });
+            let found = Found { lanes, leader, follower };
+            seen.sweep(first + k * piece, found, &mut ahead, &mut behind, &look_aside);
         });
     }
 }
@@ -113,6 +120,36 @@ fn look([own, left, right]: [u16; 3], nearest: &[u32]) -> [u32; 3] {
 }
 
 impl Seen<'_> {
+    /// Finds the neighbours of those from an index on; `ahead` and `behind` begin with who is
+    /// nearest there.
+    fn sweep(
+        &self,
+        from: usize,
+        found: Found<'_>,
+        ahead: &mut [u32],
+        behind: &mut [u32],
+        look_aside: &impl Fn(usize) -> bool,
+    ) {
+        let Found { lanes, leader, follower } = found;
+        let range = from..from + lanes.len();
+        for (i, lanes) in range.clone().zip(lanes.iter_mut()) {
+            let lane = self.fleet.lane[i];
+            let (left, right) = if look_aside(i) {
+                self.map.beside(lane, self.fleet.s_m[i])
+            } else {
+                (NO_LANE, NO_LANE)
+            };
+            *lanes = [lane, left, right];
+        }
+        // From the front: the last one seen in a lane is the leader of the next one.
+        self.visit_front_first(range.clone(), ahead, |i, nearest| {
+            leader[i - from] = look(lanes[i - from], nearest);
+        });
+        self.visit_back_first(range, behind, |i, nearest| {
+            follower[i - from] = look(lanes[i - from], nearest);
+        });
+    }
+
     /// Visits a range from its front, with the nearest one ahead in each lane; `nearest` begins with
     /// those ahead of the range.
     fn visit_front_first(

@@ -42,9 +42,11 @@ pub(crate) fn publish(
 ) {
     let (fleet, map) = (&engine.state.fleet, &engine.map);
     let radius_m = engine.config.scene_radius_m;
-    let first = fleet.s_m.partition_point(|&s| s < ego_s_m - radius_m);
+    let near = engine.present();
+    let behind = |&s: &f64| s < ego_s_m - radius_m;
+    let first = near.start + fleet.s_m[near.clone()].partition_point(behind);
     scene.neighbours.clear();
-    for i in first..fleet.len() {
+    for i in first..near.end {
         let driver = &fleet.driver[i];
         if fleet.s_m[i] - driver.length_m > ego_s_m + radius_m {
             break;

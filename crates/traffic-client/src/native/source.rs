@@ -16,8 +16,8 @@ use crate::TrafficError;
 /// Length of a tick, ns.
 const TICK_NS: i64 = 100_000_000;
 
-/// IDM + MOBIL traffic on a road.
-#[derive(Debug, Clone)]
+/// IDM + MOBIL traffic on a road. `clone_from` copies into the memory that is there.
+#[derive(Debug)]
 pub struct NativeTraffic {
     engine: Engine,
     road: Arc<Road>,
@@ -27,6 +27,26 @@ pub struct NativeTraffic {
     scene: Scene,
     /// Scenes have map poses.
     map_poses: bool,
+}
+
+impl Clone for NativeTraffic {
+    fn clone(&self) -> Self {
+        Self {
+            engine: self.engine.clone(),
+            road: Arc::clone(&self.road),
+            scene: self.scene.clone(),
+            ..*self
+        }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        let Self { engine, road, geometry, tick_start, scene, map_poses } = from;
+        self.engine.clone_from(engine);
+        self.road.clone_from(road);
+        self.scene.time = scene.time;
+        self.scene.neighbours.clone_from(&scene.neighbours);
+        (self.geometry, self.tick_start, self.map_poses) = (*geometry, *tick_start, *map_poses);
+    }
 }
 
 /// Everything that changes in a [`NativeTraffic`]: save it, restore it, the same bits go on.
@@ -122,7 +142,7 @@ impl NativeTraffic {
     }
 
     /// Traffic that begins with the vehicles of a measured boundary and gets its arrivals from it:
-    /// what happens on the road in between is the drivers' own. No warm-up.
+    /// what happens on the road in between is the drivers' own. No warm-up, no window.
     ///
     /// # Errors
     /// As [`NativeTraffic::new`].
@@ -132,7 +152,8 @@ impl NativeTraffic {
         config: TrafficConfig,
         boundary: Arc<Boundary>,
     ) -> Result<Self, TrafficError> {
-        let mut traffic = Self::new(road, geometry, TrafficConfig { warm_up_s: 0.0, ..config })?;
+        let config = TrafficConfig { warm_up_s: 0.0, window: None, ..config };
+        let mut traffic = Self::new(road, geometry, config)?;
         traffic.engine.bound(boundary);
         Ok(traffic)
     }
@@ -247,6 +268,7 @@ impl NativeTraffic {
 
     /// Sees the ego as it was at `tick`, moved back along the road from `now`.
     fn see_ego(&mut self, ego: &EgoState, now: Time, tick: Time) {
+        self.engine.ego_s_m = Some(ego.s_m);
         if !self.engine.config.sees_ego {
             self.engine.ego.clear();
             return;

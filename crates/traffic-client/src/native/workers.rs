@@ -53,7 +53,7 @@ pub(super) fn in_pieces<T: Send, R: Send>(
     results.into_iter().flatten().collect()
 }
 
-/// Ranges of `piece` out of `n`.
-pub(super) fn ranges(n: usize, piece: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..n.div_ceil(piece)).map(move |k| k * piece..n.min((k + 1) * piece))
+/// Ranges of `piece` out of one.
+pub(super) fn ranges(of: Range<usize>, piece: usize) -> impl Iterator<Item = Range<usize>> {
+    of.clone().step_by(piece).map(move |from| from..of.end.min(from + piece))
 }

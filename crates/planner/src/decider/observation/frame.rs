@@ -91,10 +91,23 @@ pub(crate) fn sees_anyone(frame: &Frame) -> bool {
 }
 
 /// The frames of the last three seconds.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Observer {
     frames: VecDeque<Frame>,
     per_second: usize,
+}
+
+impl Clone for Observer {
+    fn clone(&self) -> Self {
+        let mut frames = VecDeque::with_capacity(self.frames.capacity());
+        frames.extend(self.frames.iter().copied());
+        Self { frames, per_second: self.per_second }
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.frames.clone_from(&from.frames);
+        self.per_second = from.per_second;
+    }
 }
 
 impl Observer {
