@@ -12,7 +12,7 @@ use crate::fault::Fault;
 use crate::scenario::changed;
 
 /// Figures of an episode, in the order of [`row`].
-const FIGURES: [&str; 9] = [
+const FIGURES: [&str; 10] = [
     "decisions",
     "time_s",
     "reward_s",
@@ -21,6 +21,7 @@ const FIGURES: [&str; 9] = [
     "lane_changes",
     "aborted",
     "refused",
+    "hard_braking_caused",
     "collided",
 ];
 
@@ -34,6 +35,7 @@ fn row(stats: &EpisodeStats) -> [f64; FIGURES.len()] {
         f64::from(stats.lane_changes),
         f64::from(stats.aborted),
         f64::from(stats.refused),
+        f64::from(stats.hard_braking_caused),
         f64::from(u8::from(stats.collided)),
     ]
 }

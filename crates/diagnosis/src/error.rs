@@ -151,12 +151,12 @@ pub enum DiagnosisError {
     },
     /// An engine cannot burn so much or so little for the work that it does.
     #[error(
-        "drive {drive}: column fuel_rate_g_s makes {g_per_kwh:.0} g for a kWh at the crank, taken as g/s; an engine burns 180 to 300{hint}"
+        "drive {drive}: column fuel_rate_g_s makes {g_per_kwh:.0} g for a kWh at the crank under load, taken as g/s; an engine burns 180 to 250{hint}"
     )]
     FuelUnit {
         /// Name of the drive.
         drive: String,
-        /// Fuel over work, g/kWh.
+        /// Fuel over work under load, g/kWh.
         g_per_kwh: f64,
         /// The unit that it looks like, in words that go on.
         hint: &'static str,

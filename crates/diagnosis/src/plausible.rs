@@ -6,7 +6,7 @@ use crate::{Channel as C, DiagnosisError, Drive, DriveSet, Plant};
 const MAX_DEVIATION: f64 = 0.08;
 
 /// Shortest drive that can be judged, s: a rollout, and the rest of the filters' memory.
-const MIN_DURATION_S: f64 = 90.0;
+pub(crate) const MIN_DURATION_S: f64 = 90.0;
 
 /// Change of speed between samples, m/s, that no truck makes (40 m/s²), and the part of the samples
 /// with one above which the rows are not in the order of time.
@@ -49,11 +49,14 @@ pub(crate) fn check_length(set: &DriveSet) -> Result<(), DiagnosisError> {
     Ok(())
 }
 
-/// Fuel that no engine burns over a drive, g/kWh: with idling and every cause of the catalogue it
-/// stays between.
-const FUEL_G_PER_KWH: [f64; 2] = [120.0, 500.0];
-/// Work that a drive needs to be judged by its fuel, kWh.
-const LEAST_WORK_KWH: f64 = 2.0;
+/// Fuel that no engine burns above 0.4 of its full load, g/kWh: with every cause of the catalogue at
+/// its bound (the fuel's or the torque's scale, consumption at low load, which is gone there) it stays
+/// between; per hour, in kilograms or litres, it does not.
+const FUEL_G_PER_KWH: [f64; 2] = [90.0, 500.0];
+/// Part of the full load from which an engine's consumption hangs little on the load.
+const HIGH_LOAD_FRAC: f64 = 0.4;
+/// Work there that a drive needs to be judged by its fuel, kWh.
+const LEAST_WORK_KWH: f64 = 1.0;
 
 /// Refuses drives of another truck, drive by drive: two trucks may lie in one folder.
 pub(crate) fn check_truck(plant: &Plant, set: &DriveSet) -> Result<(), DiagnosisError> {
@@ -116,7 +119,7 @@ fn check_ratios(plant: &Plant, d: &Drive) -> Result<(), DiagnosisError> {
     Ok(())
 }
 
-/// Fuel over the work at the crank.
+/// Fuel over the work at the crank, at high load.
 fn check_fuel(plant: &Plant, d: &Drive) -> Result<(), DiagnosisError> {
     let (Some(fuel), Some(torque), Some(n)) =
         (d.get(C::FuelRateGS), d.get(C::EngineTorquePercent), d.get(C::EngineSpeedRpm))
@@ -127,9 +130,11 @@ fn check_fuel(plant: &Plant, d: &Drive) -> Result<(), DiagnosisError> {
     let rows = fuel.iter().zip(torque).zip(n);
     let (mut fuel_g, mut work_j) = (0.0, 0.0);
     for ((fuel, torque), n) in rows {
-        fuel_g += fuel * Drive::STEP_S;
-        let power_w = 0.01 * torque * reference_nm * n / tractrix_core::RPM_PER_RAD_S;
-        work_j += power_w.max(0.0) * Drive::STEP_S;
+        let (nm, rad_s) = (0.01 * torque * reference_nm, n / tractrix_core::RPM_PER_RAD_S);
+        if nm > HIGH_LOAD_FRAC * plant.engine.full_load_nm.at(rad_s) {
+            fuel_g += fuel * Drive::STEP_S;
+            work_j += nm * rad_s * Drive::STEP_S;
+        }
     }
     let work_kwh = work_j / 3.6e6;
     let g_per_kwh = fuel_g / work_kwh;
@@ -138,6 +143,6 @@ fn check_fuel(plant: &Plant, d: &Drive) -> Result<(), DiagnosisError> {
         return Ok(());
     }
     let hint =
-        if (600.0..1500.0).contains(&g_per_kwh) { "; it seems to be in l/h or kg/h" } else { "" };
+        if (500.0..1200.0).contains(&g_per_kwh) { "; it seems to be in l/h or kg/h" } else { "" };
     Err(DiagnosisError::FuelUnit { drive: d.name.clone(), g_per_kwh, hint })
 }

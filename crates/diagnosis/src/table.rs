@@ -1,8 +1,4 @@
-//! A folder of measured drives, written as the contract has it: `drives.toml` and CSV tables.
-
-use serde::Serialize;
-
-use crate::DiagnosisError;
+//! A table of a folder of measured drives, written as the contract has it.
 
 /// A table of a folder of drives: one drive, or its map.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -53,36 +49,4 @@ impl Table {
         text.push('\n');
         text
     }
-}
-
-#[derive(Serialize)]
-struct Index<'a> {
-    schema: u32,
-    truck: &'a str,
-    drive: Vec<Entry>,
-}
-
-#[derive(Serialize)]
-struct Entry {
-    name: String,
-    file: String,
-    map: Option<String>,
-    reported_mass_kg: Option<f64>,
-    tyres_warm_at_start: Option<bool>,
-}
-
-/// `drives.toml` of drives of a truck.
-///
-/// # Errors
-/// [`DiagnosisError::Numerics`] if it cannot be serialised.
-pub fn drives_index(truck: &str, tables: &[Table]) -> Result<String, DiagnosisError> {
-    let entry = |t: &Table| Entry {
-        name: t.name.clone(),
-        file: format!("{}.csv", t.name),
-        map: t.map.clone(),
-        reported_mass_kg: t.reported_mass_kg,
-        tyres_warm_at_start: t.tyres_warm_at_start,
-    };
-    let index = Index { schema: 1, truck, drive: tables.iter().map(entry).collect() };
-    toml::to_string(&index).map_err(|e| DiagnosisError::Numerics(e.to_string()))
 }

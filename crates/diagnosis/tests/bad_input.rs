@@ -217,6 +217,35 @@ fn fuel_per_hour_is_refused_with_drive_column_and_value() {
     assert!(findings.iter().any(dropped), "{findings:?}");
 }
 
+/// Engineering bounds of the catalogue: nobody's fault may be taken for a wrong unit.
+#[test]
+fn fuel_that_a_cause_doubles_or_halves_is_never_a_wrong_unit() {
+    // fuel's scale, torque's scale, extra fuel at low load
+    let causes = [
+        (0.6, 1.0, 0.0),
+        (1.6, 1.0, 0.0),
+        (1.0, 0.7, 0.0),
+        (1.0, 1.4, 0.0),
+        (1.0, 1.0, 2.0),
+        (1.0, 1.0, -0.6),
+    ];
+    for (fuel_scale, torque_scale, low_load) in causes {
+        let mut drives =
+            generate(&[], &Campaign { drives: 4, duration_s: 300.0, tolerance: 1.0 }, 5);
+        for d in &mut drives.drives {
+            let torque = d.get(C::EngineTorquePercent).unwrap().to_vec();
+            let fuel = d.get(C::FuelRateGS).unwrap().iter().zip(&torque).map(|(fuel, percent)| {
+                fuel * fuel_scale * (1.0 + low_load * (1.0 - percent / 40.0).max(0.0))
+            });
+            d.set(C::FuelRateGS, fuel.collect());
+            let torque = torque.iter().map(|percent| percent * torque_scale);
+            d.set(C::EngineTorquePercent, torque.collect());
+        }
+        let said = judge(&drives);
+        assert!(said.is_ok(), "{fuel_scale} {torque_scale} {low_load}: {said:?}");
+    }
+}
+
 #[test]
 fn a_speed_in_mph_without_a_receiver_is_refused_with_the_unit() {
     let change = |_, c: C, v: &mut Vec<f64>| match c {

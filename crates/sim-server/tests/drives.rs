@@ -35,6 +35,16 @@ fn half_a_minute_of_a_real_truck_becomes_a_drive_that_says_where_it_is_from() {
     assert_eq!(speed["others"][0], "CCVS1.speed of 00 on channel 0");
     let missing = of_log["missing"].as_array().unwrap();
     assert!(missing.iter().any(|m| m["why"] == "nobody sends VDC2.yaw_rate"));
+    // half a minute without a map: what can be asked of it, and what not and why
+    let notes = of_log["drives"][0]["notes"].as_array().unwrap();
+    assert!(notes.iter().any(|n| n.as_str().unwrap().contains("too short for diagnose")));
+    let causes = report["columns_for"].as_array().unwrap();
+    assert!(causes.contains(&"turbo_lag".into()) && !causes.contains(&"mass".into()));
+    let not = report["not_observable"].as_array().unwrap();
+    let mass = not.iter().find(|n| n["id"] == "mass").unwrap();
+    assert_eq!(mass["missing_columns"], serde_json::json!(["grade_frac"]));
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(said.contains("for want of grade_frac, of: rolling_resistance"), "{said}");
     let table = read("t270_normal_1.csv");
     let mut lines = table.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -72,7 +82,7 @@ fn a_log_without_a_drive_gets_one_line_that_says_why_and_leaves_nothing() {
     let cases: [(&[&str], &str); 8] = [
         (&[&idle], "the truck stands for all of 127 s"),
         (&[&parked], "error or not available in all of"),
-        (&[&drives], "30 s of driving, shorter than 60 s"),
+        (&[&drives], "shorter than 60 s; diagnose and identify need 90 s"),
         (&[&empty], "nobody sends HRW rear wheels or EBC2"),
         (&[&binary], "binary.log"),
         (&["nowhere.log"], "nowhere.log"),

@@ -7,14 +7,16 @@
 //! | shift taken back | the gear before the last shift is engaged again within 8 s |
 //! | lugging | clutch locked, pedal above 80 %, engine below the truck's lugging limit |
 //! | jerk | change of the acceleration over one second, as ISO 15622 averages it; from standstill to standstill |
-//! | hard braking caused | a vehicle behind the truck in its lane brakes harder than 3 m/s² within twice its safe gap while the truck brakes harder than 1 m/s², or the truck has entered its lane within the last 5 s; once per vehicle and braking |
+//! | hard braking caused | of a vehicle behind ([`Behind`]) |
 
 use std::collections::VecDeque;
 
 use hdrhistogram::Histogram;
-use planner::safety::{RssConfig, SafeGap};
+use planner::safety::RssConfig;
 use serde::Serialize;
-use tractrix_core::{Maneuver, Neighbour, RPM_PER_RAD_S, Recorder, Tick, Time, VehicleLimits};
+use tractrix_core::{RPM_PER_RAD_S, Recorder, Tick, Time, VehicleLimits};
+
+use crate::behind::Behind;
 
 /// A shift is taken back when its reverse comes within this time, s.
 const TAKEN_BACK_S: f64 = 8.0;
@@ -22,12 +24,6 @@ const TAKEN_BACK_S: f64 = 8.0;
 const LUGGING_PEDAL_FRAC: f64 = 0.8;
 /// Loss of speed over a second from which the truck is slowing, m/s.
 const SLOWING_M_S: f64 = 0.05;
-/// Braking of others from which it is hard, m/s².
-const HARD_M_S2: f64 = 3.0;
-/// Braking of the ego that may be its cause, m/s².
-const EGO_BRAKES_M_S2: f64 = 1.0;
-/// Time after the ego's entry into a lane for which braking behind it is its doing, s.
-const ENTERED_S: f64 = 5.0;
 /// Ego states kept, s.
 const MEMORY_S: f64 = 1.0;
 /// Spacing of the samples of acceleration and jerk, s.
@@ -129,8 +125,7 @@ pub struct Drivability {
     /// The last shift: from, to, when.
     shift: Option<(u8, u8, Time)>,
     moving: bool,
-    entered: Option<Time>,
-    braking_behind: Vec<u64>,
+    behind: Behind,
 }
 
 impl Drivability {
@@ -155,8 +150,7 @@ impl Drivability {
             slowing: None,
             shift: None,
             moving: true,
-            entered: None,
-            braking_behind: Vec::new(),
+            behind: Behind::default(),
         }
     }
 
@@ -282,41 +276,6 @@ impl Drivability {
             self.out.max_gap_m = Some(self.out.max_gap_m.map_or(gap_m, |m| m.max(gap_m)));
         }
     }
-
-    /// Vehicles behind that brake hard because of the truck.
-    fn watch_behind(&mut self, tick: &Tick<'_>) {
-        let changing = matches!(tick.plan.maneuver, Maneuver::ChangeLeft | Maneuver::ChangeRight);
-        if changing {
-            self.entered = Some(tick.now);
-        }
-        let entered = self.entered.is_some_and(|t| tick.now.seconds_since(t) < ENTERED_S);
-        let ego = tick.ego;
-        let cause = entered || ego.accel_x_m_s2 < -EGO_BRAKES_M_S2;
-        let g = &self.limits.geometry;
-        let rear_m = ego.s_m - g.rear_m();
-        let beside = |n: &&Neighbour| (n.d_m - ego.d_m).abs() < 0.5 * (n.width_m + g.width_m);
-        let behind = tick
-            .scene
-            .neighbours
-            .iter()
-            .filter(|n| n.front_s_m < rear_m)
-            .filter(beside)
-            .max_by(|a, b| a.front_s_m.total_cmp(&b.front_s_m));
-        let hard = behind.filter(|n| n.accel_m_s2 < -HARD_M_S2 && n.speed_m_s > 0.5);
-        match hard {
-            Some(n) if !self.braking_behind.contains(&n.id) => {
-                let safe =
-                    SafeGap::new(&self.rss.behind(n.class), self.rss.ego_brake_max_m_s2, 0.0);
-                let near_m = 2.0 * safe.gap_m(n.speed_m_s, ego.speed_m_s).max(10.0);
-                if cause && rear_m - n.front_s_m < near_m {
-                    self.out.hard_braking_caused += 1;
-                    self.braking_behind.push(n.id);
-                }
-            }
-            Some(_) => {}
-            None => self.braking_behind.clear(),
-        }
-    }
 }
 
 impl Recorder for Drivability {
@@ -331,8 +290,11 @@ impl Recorder for Drivability {
         self.watch_engine(tick, dt_s);
         self.watch_comfort(tick);
         self.watch_ahead(tick);
-        self.watch_behind(tick);
-        let (ego, plan) = (tick.ego, tick.plan);
+        let (ego, plan, geometry) = (tick.ego, tick.plan, &self.limits.geometry);
+        let Tick { now, scene, .. } = *tick;
+        let brakes =
+            self.behind.begins_to_brake(now, ego, scene, plan.maneuver, geometry, &self.rss);
+        self.out.hard_braking_caused += u32::from(brakes);
         self.memory.push_back((tick.now, ego.speed_m_s, ego.accel_x_m_s2, plan.target_accel_m_s2));
         while self.memory.front().is_some_and(|m| tick.now.seconds_since(m.0) >= MEMORY_S) {
             self.memory.pop_front();

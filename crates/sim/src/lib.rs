@@ -37,6 +37,7 @@
 //! ```
 
 pub mod batch;
+mod behind;
 mod bus_loop;
 mod collision;
 mod drivability;

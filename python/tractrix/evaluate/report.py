@@ -37,9 +37,12 @@ SHOWN = {
     "lane_changes": ("lane changes", 1.0),
     "aborted": ("aborted", 1.0),
     "refused": ("refused", 1.0),
+    "hard_braking_caused": ("hard braking caused", 1.0),
     "collided": ("collisions", 1.0),
 }
 """Figures of an episode in the tables: heading and factor."""
+COMPARED = ("delta_speed_frac", "lane_changes")
+"""Those whose intervals the table shows; the others' are in `results.json`."""
 
 
 def summary(results: Results, reference: str) -> dict[str, Any]:
@@ -70,7 +73,10 @@ def markdown(table: Mapping[str, Any], reference: str) -> str:
     for scenario, rows in table.items():
         cells = dict(zip(PAPER_DECIDERS, PAPER.get(scenario, ()), strict=False))
         for decider, row in rows.items():
-            shown = [_cell(row[name], factor) for name, (_, factor) in SHOWN.items()]
+            shown = [
+                _cell(row[name], factor, name in COMPARED)
+                for name, (_, factor) in SHOWN.items()
+            ]
             learned = decider.startswith("dqn:")
             cell = cells.get("learned" if learned else decider)
             paper = f"{cell[0]:.1f}; {cell[1]:.2f}" if cell else ""
@@ -82,9 +88,9 @@ def markdown(table: Mapping[str, Any], reference: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _cell(row: Mapping[str, Any], factor: float) -> str:
+def _cell(row: Mapping[str, Any], factor: float, compared: bool) -> str:
     text = f"{factor * row['mean']:.2f}"
-    if "minus_reference" in row:
+    if compared and "minus_reference" in row:
         low, high = (factor * x for x in row["minus_reference"]["t"])
         text += f" ({low:+.2f} to {high:+.2f})"
     return text

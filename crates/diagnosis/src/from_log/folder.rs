@@ -9,11 +9,12 @@ use j1939::bus::candump::messages;
 use road::{GeoReference, Road};
 use serde::Serialize;
 
+use super::observable::Causes;
 use super::{
     Choice, Conversion, Converted, Dbc, LeftOut, Log, LoggedDrive, OnRoad, Span, Unfilled,
 };
-use crate::DiagnosisError;
-use crate::table::{Table, drives_index};
+use crate::plausible::MIN_DURATION_S;
+use crate::{DiagnosisError, Table, drives_index};
 
 /// Step of the map table, m.
 const MAP_STEP_M: f64 = 5.0;
@@ -89,6 +90,8 @@ pub struct Report {
     /// The road, as the user gave it.
     map: Option<String>,
     logs: Vec<LogReport>,
+    #[serde(flatten)]
+    causes: Causes,
 }
 
 #[derive(Debug, Serialize)]
@@ -224,9 +227,13 @@ impl Job<'_> {
         if tables.is_empty() {
             let why = logs.iter().flat_map(|l| &l.left_out).map(|l| l.why.as_str());
             let why: Vec<&str> = why.collect();
-            let what = format!("no drive is long enough: {}", why.join("; "));
+            let what = format!(
+                "no drive is long enough: {}; diagnose and identify need {MIN_DURATION_S} s",
+                why.join("; ")
+            );
             return Err(DiagnosisError::NoDrives { what });
         }
+        let causes = Causes::of(&tables);
         let map = self.map.filter(|_| tables.iter().any(|t| t.map.is_some()));
         Ok(DriveFolder {
             tables,
@@ -236,6 +243,7 @@ impl Job<'_> {
                 truck: self.truck_name.to_owned(),
                 map: self.map.map(|m| m.name.clone()),
                 logs,
+                causes,
             },
         })
     }
@@ -295,7 +303,10 @@ fn take(
     };
     let mut drives = Vec::new();
     for (k, drive) in made.drives.into_iter().enumerate() {
-        let LoggedDrive { span, columns, distance_m, notes, on_map } = drive;
+        let LoggedDrive { span, columns, distance_m, mut notes, on_map } = drive;
+        if span.duration_s() < MIN_DURATION_S {
+            notes.push(format!("too short for diagnose and identify ({MIN_DURATION_S} s)"));
+        }
         let name = format!("{name}_{}", k + 1);
         drives.push(DriveReport { name: name.clone(), span, distance_m, on_map, notes });
         tables.push(Table {
@@ -367,6 +378,7 @@ impl Report {
                 lines.push("  no mass: neither --mass-kg nor a message (CVW)".to_owned());
             }
         }
+        lines.extend(self.causes.sentences());
         lines.join("\n")
     }
 }

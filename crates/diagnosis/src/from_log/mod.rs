@@ -20,6 +20,7 @@ mod collect;
 mod dbc;
 mod folder;
 mod grade;
+mod observable;
 mod place;
 mod signals;
 mod trips;

@@ -7,10 +7,8 @@ mod units;
 
 use std::path::Path;
 
-use serde::Deserialize;
-use tractrix_core::words::deserializer_message;
-
 use crate::drive::RoadMap;
+use crate::index::{Entry, INDEX, Index};
 use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial, Trace, collect};
 
 /// Columns of one file by name, as written, `NaN` where a value is missing.
@@ -25,54 +23,6 @@ impl RawTable {
     #[must_use]
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         self.columns.iter().find(|c| c.0 == name).map(|c| c.1.as_slice())
-    }
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Index {
-    schema: u32,
-    truck: String,
-    #[serde(default)]
-    drive: Vec<Entry>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Entry {
-    name: String,
-    file: String,
-    map: Option<String>,
-    reported_mass_kg: Option<f64>,
-    tyres_warm_at_start: Option<bool>,
-}
-
-/// Name of a folder's index.
-const INDEX: &str = "drives.toml";
-
-impl Index {
-    fn read(dir: &Path) -> Result<Self, DiagnosisError> {
-        let path = dir.join(INDEX);
-        let text = std::fs::read_to_string(&path)
-            .map_err(|e| DiagnosisError::Io { path: path.clone(), why: e.to_string() })?;
-        let bad = |why: String| DiagnosisError::Index { path: path.clone(), why };
-        let index: Index = toml::from_str(&text).map_err(|e| {
-            let before = e.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-            let line = before.matches('\n').count() + 1;
-            bad(format!("line {line}: {}", deserializer_message(e.message())))
-        })?;
-        if index.schema != 1 {
-            return Err(bad(format!("schema = {}, this program reads schema 1", index.schema)));
-        }
-        if index.drive.is_empty() {
-            return Err(bad("no [[drive]] in it".into()));
-        }
-        for (i, entry) in index.drive.iter().enumerate() {
-            if index.drive[..i].iter().any(|d| d.name == entry.name) {
-                return Err(bad(format!("two drives are named {:?}", entry.name)));
-            }
-        }
-        Ok(index)
     }
 }
 

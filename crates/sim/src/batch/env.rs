@@ -5,15 +5,17 @@ use std::sync::Arc;
 use dynamics::{TruckModel, TruckParameters};
 use planner::decider::observation::{Observer, frame};
 use planner::decider::{DeciderKind, LaneChoice};
+use planner::safety::RssConfig;
 use planner::{RatesConfig, Situation, StackConfig, Tactics};
 use road::Road;
-use tractrix_core::{LaneChangeRefusal, Maneuver, Recorder, Tick, Vehicle};
+use tractrix_core::{Geometry, LaneChangeRefusal, Maneuver, Recorder, Tick, Vehicle};
 use traffic_client::Mode;
 use traffic_client::native::{NativeSnapshot, NativeTraffic};
 
 use super::kinematic::Kinematic;
 use super::reward::RewardConfig;
 use super::{ACTIONS, EnvSpec, EpisodeStats, Fidelity, SUBSTEP_S, Substep, mix};
+use crate::behind::Behind;
 use crate::{EgoStart, SimError, SimTruck, Status, TrafficKind, World};
 
 /// Warmed traffic to begin with; arrivals, drivers to come and the start differ with the seed.
@@ -46,6 +48,7 @@ pub(super) struct State {
     observer: Observer,
     pub(super) stats: EpisodeStats,
     maneuver: Maneuver,
+    behind: Behind,
     start_s_m: f64,
     /// Where the seeds of the episodes are from, and how many have ended since.
     stream: u64,
@@ -70,13 +73,19 @@ impl Clone for Body {
 
 impl Clone for State {
     fn clone(&self) -> Self {
-        Self { body: self.body.clone(), observer: self.observer.clone(), ..*self }
+        Self {
+            body: self.body.clone(),
+            observer: self.observer.clone(),
+            behind: self.behind.clone(),
+            ..*self
+        }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { body, observer, stats, maneuver, start_s_m, stream, episode } = from;
+        let Self { body, observer, behind, stats, maneuver, start_s_m, stream, episode } = from;
         self.body.clone_from(body);
         self.observer.clone_from(observer);
+        self.behind.clone_from(behind);
         (self.stats, self.maneuver, self.start_s_m) = (*stats, *maneuver, *start_s_m);
         (self.stream, self.episode) = (*stream, *episode);
     }
@@ -238,7 +247,9 @@ impl Env {
         observer.clear();
         let stats = EpisodeStats { seed, ..EpisodeStats::default() };
         let maneuver = Maneuver::KeepLane;
-        self.state = Some(State { body, observer, stats, maneuver, start_s_m, stream, episode });
+        let behind = Behind::default();
+        self.state =
+            Some(State { body, observer, stats, maneuver, behind, start_s_m, stream, episode });
         Ok(())
     }
 
@@ -252,7 +263,7 @@ impl Env {
         let (mut collided, mut over) = (false, false);
         for k in 0..shared.substeps {
             let wished = if k == 0 { wish } else { LaneChoice::Keep };
-            let step = state.substep(wished, shared.ticks)?;
+            let step = state.substep(wished, &shared)?;
             refused |= wished != LaneChoice::Keep && step.refused.is_some();
             let is_new = step.maneuver != state.maneuver;
             state.maneuver = step.maneuver;
@@ -348,19 +359,30 @@ impl Body {
 
 impl State {
     /// Drives [`SUBSTEP_S`].
-    fn substep(&mut self, wish: LaneChoice, ticks: u32) -> Result<Substep, SimError> {
-        let world = match &mut self.body {
-            Body::Kinematic(kinematic) => return kinematic.step(wish),
+    fn substep(&mut self, wish: LaneChoice, shared: &Shared) -> Result<Substep, SimError> {
+        let rss = &shared.spec.scenario.stack.rss;
+        let Self { body, behind, stats, .. } = self;
+        let world = match body {
+            Body::Kinematic(kinematic) => {
+                let step = kinematic.step(wish)?;
+                let Situation { now, ego, scene, limits, .. } = kinematic.at();
+                let geometry = &limits.geometry;
+                let brakes = behind.begins_to_brake(now, ego, scene, step.maneuver, geometry, rss);
+                stats.hard_braking_caused += u32::from(brakes);
+                return Ok(step);
+            }
             Body::Truck(world) => world,
         };
         world.stack_mut().request_lane_change(wish);
-        let mut seen = Seen(None);
+        let geometry = &world.truck().limits().geometry.clone();
+        let mut seen = Seen { last: None, behind, brake: 0, geometry, rss };
         let mut first: Option<Substep> = None;
-        for _ in 0..ticks {
+        for _ in 0..shared.ticks {
             world.tick(&mut seen)?;
-            first = first.or(seen.0);
+            first = first.or(seen.last);
         }
-        let (first, last) = match (first, seen.0) {
+        stats.hard_braking_caused += seen.brake;
+        let (first, last) = match (first, seen.last) {
             (Some(first), Some(last)) => (first, last),
             _ => return Err(not_begun()),
         };
@@ -386,13 +408,23 @@ impl State {
     }
 }
 
-/// The last tick of a world.
-struct Seen(Option<Substep>);
+/// The last tick of a world, and how many began to brake behind the truck.
+struct Seen<'a> {
+    last: Option<Substep>,
+    behind: &'a mut Behind,
+    brake: u32,
+    geometry: &'a Geometry,
+    rss: &'a RssConfig,
+}
 
-impl Recorder for Seen {
+impl Recorder for Seen<'_> {
     fn record(&mut self, tick: &Tick<'_>) {
         let refused: Option<LaneChangeRefusal> = tick.plan.refusal;
-        self.0 = Some(Substep {
+        let Tick { now, ego, scene, plan } = *tick;
+        let Self { behind, geometry, rss, .. } = self;
+        let brakes = behind.begins_to_brake(now, ego, scene, plan.maneuver, geometry, rss);
+        self.brake += u32::from(brakes);
+        self.last = Some(Substep {
             speed_m_s: tick.ego.speed_m_s,
             reference_m_s: tick.plan.reference_speed_m_s,
             maneuver: tick.plan.maneuver,

@@ -23,6 +23,8 @@ pub struct EpisodeStats {
     pub aborted: u32,
     /// Wishes that were refused.
     pub refused: u32,
+    /// Vehicles behind that braked hard because of the truck.
+    pub hard_braking_caused: u32,
     /// The episode ended by touching another vehicle.
     pub collided: bool,
 }
