@@ -22,8 +22,36 @@ use crate::signal::signal;
 
 /// Standard deviation of a cause's size between drives, in its size.
 const TAU: f64 = 0.03;
-/// Standard deviation of a cause's course along a signal, in its size.
+/// Standard deviation of a cause's course along a signal, in its size, where physics gives its law.
 const RHO: f64 = 0.05;
+/// The same where the law is what a maker chose or a component happens to do, and the catalogue's is
+/// one of many: a quarter more or less is still that cause.
+const RHO_SHAPE: f64 = 0.25;
+
+/// Standard deviation of the course of a cause with this size.
+fn rho(p: P) -> f64 {
+    match p {
+        P::WarmupAmp
+        | P::FanPower
+        | P::Friction
+        | P::EngineBrakeScale
+        | P::Altitude
+        | P::HeatAir
+        | P::HeatCoolant
+        | P::TurboLag
+        | P::PedalDelay
+        | P::ShiftTime
+        | P::FuelLow
+        | P::BrakeDelay
+        | P::Fade
+        | P::RetarderStage
+        | P::RetarderBrake
+        | P::RetarderCoast
+        | P::FreePlay
+        | P::SteerLag => RHO_SHAPE,
+        _ => RHO,
+    }
+}
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
 
@@ -43,7 +71,7 @@ pub(crate) fn signals(p: P) -> &'static [&'static str] {
         P::Altitude => &["gps_altitude_m", "engine_speed_rpm"],
         P::HeatAir => &["ambient_temp_degc", "engine_speed_rpm"],
         P::HeatCoolant => &["coolant_temp_degc", "engine_speed_rpm"],
-        P::ShiftTime => &["gear"],
+        P::ShiftTime => &["gear", "engine_speed_rpm"],
         P::FuelLow => &["engine_speed_rpm", "engine_torque_percent"],
         P::BrakeGain | P::BrakeDelay => &["brake_pressure_kpa"],
         P::Fade => &["speed_m_s", "brake_pressure_kpa"],
@@ -109,7 +137,7 @@ impl Course {
         for e in &self.0 {
             let size = (theta[e.p as usize] - zero[e.p as usize]).abs();
             out[e.column - 1] = TAU * size;
-            e.hats.iter().flatten().for_each(|j| out[j - 1] = RHO * size);
+            e.hats.iter().flatten().for_each(|j| out[j - 1] = rho(e.p) * size);
         }
         out
     }
@@ -140,7 +168,7 @@ impl Course {
             for hats in &e.hats {
                 let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
                 let part = (shows(e.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-                along.extend(hats.iter().map(|j| (*j, RHO * size * part)));
+                along.extend(hats.iter().map(|j| (*j, rho(e.p) * size * part)));
             }
         }
         gram.marginal(keep, &between, &along)

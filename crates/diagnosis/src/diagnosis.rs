@@ -1,7 +1,6 @@
 //! The diagnosis as a whole: drives in, [`Diagnosis`] out.
 
-use std::collections::BTreeMap;
-
+use crate::causes::{Answer, Named, causes};
 use crate::course::Point;
 use crate::detectable::detectable;
 use crate::drive_use::{DriveRole, DriveUse, drive_uses};
@@ -14,11 +13,11 @@ use crate::replay::{Module, Prepared};
 use crate::report_models::Models;
 use crate::search::MIN_EVIDENCE;
 use crate::sentence;
-use crate::sure::{Sure, beyond, judge};
-use crate::weights::{Weighed, probability, weights};
+use crate::sure::{Sure, beyond, describe, judge};
+use crate::unknown::Shape;
 use crate::{
-    Action, BeforeAfter, Cause, Confusion, Detectable, Diagnosis, DiagnosisError, Drive, DriveSet,
-    Executor, Finding, FindingKind, Gain, NotObservable, Parameter, Plant, Verdict, Wrong,
+    Action, BeforeAfter, Detectable, Diagnosis, DiagnosisError, Drive, DriveSet, Executor, Finding,
+    FindingKind, Gain, NotObservable, Plant, Verdict, Wrong,
 };
 
 /// Choices of the caller.
@@ -57,11 +56,6 @@ pub enum Progress {
     Report,
 }
 
-/// Evidence within which another cause says as much as the named one, nats: a lone faint cause with
-/// such a rival is not stated.
-const RIVAL_NATS: f64 = 3.0;
-/// Evidence within which another cause is listed, nats.
-const LISTED_NATS: f64 = 5.0;
 /// Probability above which a cause is stated as the explanation.
 const EXPLAINED: f64 = 0.95;
 /// Timing, noise and tolerances of a truck and its logger, learned from drives that are in order.
@@ -177,19 +171,23 @@ pub fn diagnose_with(
         }
         None => fit,
     };
-    let mut causes = causes(&problem, &fit, &empty, &open);
-    let weak = |c: &(Cause, bool)| c.1 && c.0.evidence < MIN_EVIDENCE;
+    let Answer { mut causes, instead } = causes(&problem, &fit, &empty, &open, &bare);
+    let weak = |c: &Named| c.rivalled && c.cause.evidence < MIN_EVIDENCE;
     let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);
     let fit = if faint { empty } else { fit };
     causes.retain(|_| !faint);
+    // What may be there in place of a cause is said as far as it makes the cause unsure.
+    let likely: Vec<Shape> =
+        instead.into_iter().filter(|(_, p)| *p > 1.0 - EXPLAINED).map(|(s, _)| s).collect();
+    let shape = shape.or_else(|| if faint { None } else { describe(&likely) });
     if sure == Sure::Not {
-        causes.iter_mut().for_each(|c| c.0.sentence.push_str(sentence::NOT_SURE));
+        causes.iter_mut().for_each(|c| c.cause.sentence.push_str(sentence::NOT_SURE));
     }
     let verdict = if sure == Sure::Outside {
         Verdict::Unknown
     } else if fit.set.is_empty() {
         Verdict::NothingToExplain
-    } else if sure == Sure::Not || causes.iter().any(|c| c.0.probability < EXPLAINED) {
+    } else if sure == Sure::Not || causes.iter().any(|c| c.cause.probability < EXPLAINED) {
         Verdict::Ambiguous
     } else {
         Verdict::Explained
@@ -225,7 +223,7 @@ pub fn diagnose_with(
         truck: plant.name.clone(),
         verdict,
         wrong,
-        causes: causes.into_iter().map(|c| c.0).collect(),
+        causes: causes.into_iter().map(|c| c.cause).collect(),
         unknown: shape,
         not_observable,
         detectable,
@@ -294,104 +292,6 @@ fn observable(
     not.dedup_by(|a, b| a.id == b.id);
     let detectable = detectable(&open, &information);
     (open, not, detectable)
-}
-
-/// The causes of a fit with sizes, rivals and probabilities, and whether a rival says as much. Free
-/// functions were judged before.
-fn causes(problem: &Problem<'_>, fit: &Fit, empty: &Fit, open: &[usize]) -> Vec<(Cause, bool)> {
-    let (evidence, zero) = (problem.evidence(), &problem.reference.theta);
-    let variances = evidence.variances(fit);
-    let ids = |set: &[usize]| set.iter().map(|h| CATALOGUE[*h].id).collect::<Vec<_>>();
-    let model = |causes, log_z| Weighed { causes, log_z };
-    let mut models = vec![model(ids(&fit.set), fit.log_z), model(Vec::new(), 0.0)];
-    let mut out = Vec::new();
-    for (i, h) in fit.set.iter().enumerate() {
-        let hyp = &CATALOGUE[*h];
-        let (fewer, theta) = evidence.without(fit, i);
-        let without = if fewer.is_empty() {
-            Some(empty.clone())
-        } else {
-            evidence.fit(&fewer, &theta, empty.norm)
-        };
-        let lost_nats = fit.log_z - without.as_ref().map_or(0.0, |f| f.log_z);
-        let mut confused_with: Vec<Confusion> = Vec::new();
-        let mut rivalled = false;
-        if let Some(f) = &without {
-            models.push(model(ids(&fewer), fit.log_z - lost_nats));
-            let rest: Vec<usize> = open
-                .iter()
-                .copied()
-                .filter(|o| fit.set.iter().all(|s| CATALOGUE[*s].id != CATALOGUE[*o].id))
-                .collect();
-            let mut refitted: Vec<usize> = Vec::new();
-            for c in evidence.screen(f, &rest).singles(None) {
-                let rival = &CATALOGUE[c.hypothesis];
-                let (id, mut lost) = (rival.id, lost_nats - c.gain);
-                if lost < LISTED_NATS {
-                    // A screen promises more than it keeps; who stands in for a cause passes the
-                    // gate that the cause has passed.
-                    if refitted.contains(&c.hypothesis) {
-                        continue;
-                    }
-                    refitted.push(c.hypothesis);
-                    let instead = evidence.with_added(f, &c, empty.norm);
-                    let kept = instead.map(|fit| evidence.gate(fit, empty));
-                    let kept = kept.filter(|fit| fit.set.contains(&c.hypothesis));
-                    let Some(kept) = kept else { continue };
-                    lost = fit.log_z - kept.log_z;
-                }
-                let mut instead = ids(&fewer);
-                instead.push(id);
-                models.push(model(instead, fit.log_z - lost.max(0.0)));
-                if lost < LISTED_NATS && confused_with.iter().all(|x| x.id != id) {
-                    rivalled |= lost < RIVAL_NATS;
-                    let why = sentence::confusion(hyp.id, id, lost);
-                    confused_with.push(Confusion { id, why, probability: 0.0 });
-                }
-            }
-        }
-        let mut parameters = BTreeMap::new();
-        for (j, p) in fit.free.iter().enumerate() {
-            if hyp.params().any(|q| q == *p) {
-                let s = p.spec();
-                let x = fit.theta[*p as usize] - zero[*p as usize];
-                let sigma = variances[j].sqrt();
-                let value = if s.is_factor() { 1.0 + x } else { x };
-                parameters.insert(s.key, Parameter { value, sigma, unit: s.unit });
-            }
-        }
-        let size = hyp.size(&fit.theta, zero);
-        let sigma = {
-            let of = |p: &crate::param::P| {
-                let x = fit.theta[*p as usize] - zero[*p as usize];
-                parameters.get(p.spec().key).map_or(0.0, |q: &Parameter| x * q.sigma)
-            };
-            hyp.sizes.iter().map(of).map(|x| x * x).sum::<f64>().sqrt() / size.abs().max(1e-12)
-        };
-        let unit = hyp.sizes.first().map_or("", |p| p.spec().unit);
-        let sentence = sentence::with_interval(sentence::cause(hyp.id, size), size, sigma, unit);
-        let cause = Cause {
-            id: hyp.id,
-            kind: hyp.kind(),
-            sentence,
-            parameters,
-            evidence: lost_nats,
-            probability: 0.0,
-            confused_with,
-        };
-        out.push((cause, rivalled));
-    }
-    let weights = weights(&models);
-    for (cause, _) in &mut out {
-        let holds = |m: &Weighed, id| m.causes.contains(&id);
-        cause.probability = probability(&models, &weights, |m| holds(m, cause.id));
-        for rival in &mut cause.confused_with {
-            let instead = |m: &Weighed| holds(m, rival.id) && !holds(m, cause.id);
-            rival.probability = probability(&models, &weights, instead);
-        }
-    }
-    out.sort_by(|a, b| b.0.evidence.total_cmp(&a.0.evidence));
-    out
 }
 
 fn gain(plant: &Plant, problem: &Problem<'_>, fit: &Fit) -> Gain {

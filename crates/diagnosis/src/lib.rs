@@ -19,6 +19,7 @@
 pub mod balance;
 pub mod carbon;
 mod catch_all;
+mod causes;
 mod channel;
 pub mod clock;
 pub mod coast_down;

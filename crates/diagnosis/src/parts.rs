@@ -1,7 +1,7 @@
 //! What is left outside the catalogue may be a factor on one part of the balance: an engine brake
 //! that holds less in thin air, tyres that soften as they warm. A part is the sensitivity to the
-//! figure that scales it, its factor a smooth function of a signal, judged like the other free
-//! functions.
+//! figure that scales it; its factor is as large as that figure's prior and a smooth function of a
+//! signal, judged like the other free functions.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,8 +13,6 @@ use crate::signal::SIGNALS;
 use crate::stats::evidence;
 use crate::unknown::{Acts, Shape, dispersion};
 
-/// Prior deviation of the factor.
-const FACTOR: f64 = 0.2;
 /// Correlation length over the knots' range.
 const LENGTH: f64 = 0.4;
 
@@ -111,7 +109,7 @@ impl Problem<'_> {
             let x = (i as f64 - j as f64) / (HATS - 1) as f64 / LENGTH;
             (-0.5 * x * x).exp() + if i == j { 1e-3 } else { 0.0 }
         });
-        let factor = kernel.cholesky()?.l() * FACTOR;
+        let factor = kernel.cholesky()?.l() * p.spec().prior;
         let inside = |a: &DMatrix<f64>| factor.transpose() * a * &factor;
         let (a, b, _) = gram.sum(|_| true);
         let (a, b) = (inside(&a), factor.transpose() * b);

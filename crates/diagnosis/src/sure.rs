@@ -40,9 +40,17 @@ const CATCH_ALL_PART: f64 = 0.05;
 /// left: noise that comes and goes gives every signal something.
 const FOLLOWS: f64 = 0.05;
 
-/// Modules whose measured quantity is an input of others: torque and pressure of the force balance,
-/// speed of all, yaw rate of the heading.
-const DRIVES_OTHERS: [Module; 4] = [Module::Torque, Module::Brake, Module::Force, Module::Yaw];
+/// Modules whose replay reads what another one measures: speed is read by all, torque and pressure by
+/// the force balance, torque by the fuel, the yaw rate by heading and trailer.
+fn reads(reader: Module, measured: Module) -> bool {
+    match measured {
+        Module::Force => true,
+        Module::Torque => matches!(reader, Module::Force | Module::Fuel),
+        Module::Brake => reader == Module::Force,
+        Module::Yaw => matches!(reader, Module::Heading | Module::TrailerYaw),
+        _ => false,
+    }
+}
 
 /// How sure a set of named causes is against what the catalogue does not have.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -90,10 +98,13 @@ fn against_functions(
 ) -> (Fit, Option<Unknown>, Sure) {
     let best_bare = bare.first().map_or(0.0, |s| s.log_z);
     if let Some(random) = problem.restless(&Point::of(empty))
-        && random.evidence > best_bare.max(1.15 * fit.log_z)
+        && random.evidence > best_bare
         && bare.first().is_none_or(|s| s.module != random.module || s.explained_frac < FOLLOWS)
     {
-        return (empty.clone(), Some(noise(&random)), Sure::Outside);
+        let left = apart(problem, empty, &fit, random.module);
+        if random.evidence > 1.15 * (fit.log_z - left.log_z) {
+            return (left, Some(noise(&random)), Sure::Outside);
+        }
     }
     let rest = if fit.set.is_empty() { bare.to_vec() } else { beyond(problem, &Point::of(&fit)) };
     let left = rest.first().map_or(0.0, |s| s.firm);
@@ -122,8 +133,9 @@ fn against_functions(
         return (fit, describe(&rest), sure);
     }
     if let Some(random) = problem.restless(&Point::of(&fit)) {
-        if fit.set.is_empty() || random.evidence > fit.log_z {
-            return (empty.clone(), Some(noise(&random)), Sure::Outside);
+        let left = apart(problem, empty, &fit, random.module);
+        if fit.set.is_empty() || random.evidence > fit.log_z - left.log_z {
+            return (left, Some(noise(&random)), Sure::Outside);
         }
         let sure = if sharing(&fit, random.module) > 0 { Sure::Not } else { Sure::Yes };
         return (fit, Some(noise(&random)), sure);
@@ -131,16 +143,21 @@ fn against_functions(
     (fit, None, Sure::Yes)
 }
 
-/// The causes that do not show where the best free function wins: it says nothing about them,
-/// unless what is measured there drives the replay of other modules.
+/// The causes that do not show where the best free function wins.
 fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fit {
-    let Some(won) = won.first().filter(|w| !DRIVES_OTHERS.contains(&w.module)) else {
-        return empty.clone();
+    won.first().map_or_else(|| empty.clone(), |w| apart(problem, empty, fit, w.module))
+}
+
+/// The causes that do not show where something without a name wins, nor in what is replayed from what
+/// is measured there: it says nothing about them.
+fn apart(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: Module) -> Fit {
+    let in_doubt = |cause: usize| {
+        Module::ALL.into_iter().any(|m| (m == won || reads(m, won)) && shows(cause, m))
     };
     let mut left = fit.clone();
     let mut i = 0;
     while i < left.set.len() {
-        if !shows(left.set[i], won.module) {
+        if !in_doubt(left.set[i]) {
             i += 1;
             continue;
         }
@@ -150,6 +167,8 @@ fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fi
         };
         left = refit;
     }
+    // Who stood beside those that are gone has to pay for itself now.
+    let left = problem.evidence().gate(left, empty);
     if left.log_z > UNKNOWN_EVIDENCE { left } else { empty.clone() }
 }
 
@@ -168,7 +187,7 @@ pub(crate) fn beyond(problem: &Problem<'_>, at: &Point) -> Vec<Shape> {
 }
 
 /// A cause of the catalogue acts on a module.
-fn shows(cause: usize, module: Module) -> bool {
+pub(crate) fn shows(cause: usize, module: Module) -> bool {
     CATALOGUE[cause].groups().iter().any(|g| g.modules().contains(&module))
 }
 
@@ -191,7 +210,8 @@ fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
     strained || fit.set.iter().any(|h| CATALOGUE[*h].is_at_bound(&fit.theta, zero))
 }
 
-fn describe(shapes: &[Shape]) -> Option<Unknown> {
+/// What the best of some free functions says, with the signals that say nearly as much.
+pub(crate) fn describe(shapes: &[Shape]) -> Option<Unknown> {
     let best = shapes.first()?;
     let mut signals: Vec<&'static str> = Vec::new();
     for s in shapes.iter().filter(|s| s.module == best.module && s.log_z > 0.5 * best.log_z) {

@@ -1,18 +1,23 @@
 //! How probable an explanation is: posterior weights of the models that were compared.
 //!
 //! ```text
-//! weight(M) ~ exp(log Z(M) + log p(M))     log p(M) = k ln(pi/(1-pi))
+//! weight(M) ~ exp(log Z(M) + log p(M))     log p(M) = sum over its members of ln(pi/(1-pi))
 //! ```
-//! `k` causes (MacKay, Neural Computation 4, 1992). A cause's probability is the share of the models
+//! (MacKay, Neural Computation 4, 1992). A cause's probability is the share of the models
 //! that hold it: the set that was found, the sets with one of its causes left out or replaced by
 //! another one, and none at all. What a cause adds to the form of a large one is no evidence for it ([`crate::course`]).
 //!
-//! Left out: free functions, and what the catalogue does not have. A set that may stand in for such a
-//! thing is called ambiguous whatever its weight.
+//! A free function in the place of a cause is a model like any other: what has no name may share a
+//! cause's part of the balance and follow a signal. One beside the causes is judged before
+//! ([`crate::sure`]).
 
 /// Probability that a cause of the catalogue is there before any drive is seen: with 35 causes, one
 /// truck in six has one.
 pub(crate) const PRIOR_CAUSE: f64 = 0.005;
+
+/// Probability that a free function is there: of some two hundred that are tried one, in one truck in
+/// a hundred.
+const PRIOR_FUNCTION: f64 = 5e-5;
 
 /// Log odds of a prior probability.
 fn log_odds(p: f64) -> f64 {
@@ -24,6 +29,8 @@ fn log_odds(p: f64) -> f64 {
 pub(crate) struct Weighed {
     /// Ids of its causes.
     pub(crate) causes: Vec<&'static str>,
+    /// A free function beside them, by its number.
+    pub(crate) function: Option<usize>,
     /// Log evidence, nats, from whatever level is common to all.
     pub(crate) log_z: f64,
 }
@@ -31,10 +38,15 @@ pub(crate) struct Weighed {
 /// Weights of models, in their order; they add up to one. The same set under two shapes counts once,
 /// by its better one.
 pub(crate) fn weights(models: &[Weighed]) -> Vec<f64> {
-    let score = |m: &Weighed| m.log_z + m.causes.len() as f64 * log_odds(PRIOR_CAUSE);
+    let score = |m: &Weighed| {
+        let function = m.function.map_or(0.0, |_| log_odds(PRIOR_FUNCTION));
+        m.log_z + m.causes.len() as f64 * log_odds(PRIOR_CAUSE) + function
+    };
     let scores: Vec<f64> = models.iter().map(score).collect();
     let same = |a: &Weighed, b: &Weighed| {
-        a.causes.len() == b.causes.len() && a.causes.iter().all(|c| b.causes.contains(c))
+        a.function == b.function
+            && a.causes.len() == b.causes.len()
+            && a.causes.iter().all(|c| b.causes.contains(c))
     };
     let best = |i: usize| {
         models
@@ -67,7 +79,7 @@ mod tests {
     use super::*;
 
     fn model(causes: &[&'static str], log_z: f64) -> Weighed {
-        Weighed { causes: causes.to_vec(), log_z }
+        Weighed { causes: causes.to_vec(), function: None, log_z }
     }
 
     fn of(models: &[Weighed], id: &str) -> f64 {
@@ -88,6 +100,16 @@ mod tests {
         assert!((p(log_odds(1.0 - PRIOR_CAUSE)) - 0.5).abs() < 1e-9);
         assert!((p(0.0) - PRIOR_CAUSE).abs() < 1e-9);
         assert!(p(7.0) < 0.9 && p(10.0) > 0.99);
+    }
+
+    #[test]
+    fn a_function_that_says_a_little_more_than_a_cause_makes_it_less_probable_and_not_unlikely() {
+        let function = |n, log_z| Weighed { causes: Vec::new(), function: Some(n), log_z };
+        let p =
+            |more: f64| of(&[model(&[], 0.0), model(&["a"], 40.0), function(0, 40.0 + more)], "a");
+        assert!(p(-5.0) > 0.9999 && p(1.0) > 0.95 && p(3.0) < 0.9 && p(10.0) < 0.01);
+        let models = [model(&["a"], 40.0), function(0, 42.0), function(1, 42.0)];
+        assert!(of(&models, "a") < p(2.0));
     }
 
     #[test]

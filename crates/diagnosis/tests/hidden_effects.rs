@@ -128,6 +128,19 @@ fn an_unknown_in_the_fuel_leaves_the_causes_of_the_steering_named() {
     assert_eq!(d.unknown.unwrap().quantity, "fuel_rate_g_s");
 }
 
+/// Gusts, which follow no signal, took away whatever had been found, although they shake the yaw rates
+/// alone.
+#[test]
+fn gusts_leave_the_causes_of_other_balances_named() {
+    let gusts = Effect::Outside { kind: Outside::Gusts, size: 4000.0, shape: Shape([0.5; 4]) };
+    let d = judge(&drives(&[gusts, cause("shift_duration", 0.4)], 43)).unwrap();
+    assert_eq!(d.verdict, Verdict::Unknown);
+    assert_eq!(named(&d), ["shift_duration"]);
+    let extra = d.causes[0].parameters["extra_time_s"];
+    assert!((extra.value - 0.4).abs() < 4.0 * extra.sigma, "{extra:?}");
+    assert_eq!(d.unknown.unwrap().quantity, "yaw_rate_rad_s");
+}
+
 fn named(d: &Diagnosis) -> Vec<&'static str> {
     let mut ids: Vec<&str> = d.causes.iter().map(|c| c.id).collect();
     ids.sort_unstable();
