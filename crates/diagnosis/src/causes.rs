@@ -9,7 +9,7 @@ use crate::refit::Fit;
 use crate::screen::outside;
 use crate::sentence;
 use crate::sure::{beyond, shows};
-use crate::unknown::Shape;
+use crate::unknown::{Acts, Shape};
 use crate::weights::{Weighed, probability, weights};
 use crate::{Cause, Confusion, Parameter};
 
@@ -51,8 +51,9 @@ impl Compared<'_> {
         self.models.push(Weighed { causes, function: None, log_z });
     }
 
-    /// Free functions beside `fewer`, in the modules that show the `i`-th cause: `bare` where it is
-    /// the only one. One of a signal along which the cause has a course is the cause itself.
+    /// Factors on parts of a balance beside `fewer`, in the modules that show the `i`-th cause: `bare`
+    /// where it is the only one. One of a signal along which the cause has a course is the cause
+    /// itself; so is an addition, which takes a steady effect along whatever signal it follows.
     fn functions(&mut self, i: usize, fewer: &Fit, bare: &[Shape]) {
         let beside;
         let found = if fewer.set.is_empty() {
@@ -65,7 +66,8 @@ impl Compared<'_> {
             let sizes = CATALOGUE[self.fit.set[i]].sizes.iter();
             s.memory_s == 0.0 && sizes.flat_map(|p| signals(*p)).any(|x| *x == s.signal)
         };
-        for s in found.iter().filter(|s| shows(self.fit.set[i], s.module) && !own(s)) {
+        let part = |s: &&Shape| matches!(s.acts, Acts::Part(_)) && shows(self.fit.set[i], s.module);
+        for s in found.iter().filter(part).filter(|s| !own(s)) {
             self.models.push(Weighed {
                 causes: ids(&fewer.set),
                 function: Some(self.functions.len()),

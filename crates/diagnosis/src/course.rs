@@ -31,8 +31,7 @@ const RHO_SHAPE: f64 = 0.25;
 /// Standard deviation of the course of a cause with this size.
 fn rho(p: P) -> f64 {
     match p {
-        P::WarmupAmp
-        | P::FanPower
+        P::FanPower
         | P::Friction
         | P::EngineBrakeScale
         | P::Altitude

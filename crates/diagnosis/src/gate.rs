@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::problem::Direction;
-use crate::refit::{Fit, posterior, prior};
+use crate::refit::{Fit, prior};
 use crate::stats::evidence;
 
 /// Sigmas by which a size must differ from nothing, once the drives' disagreement counts.
@@ -157,20 +157,9 @@ impl dyn Evidence + '_ {
         })
     }
 
-    /// The fit without the course of a member: what course it has is no question of whether it is
-    /// there.
-    fn plain(&self, fit: &Fit, member: usize) -> Option<Fit> {
-        let keep: Vec<usize> = (0..=fit.free.len()).collect();
-        let others = fit.course.without(CATALOGUE[fit.set[member]].sizes);
-        let gram = others.taken_out(&fit.whole, &keep, &fit.theta, self.zero())?;
-        let (covariance, _) = posterior(&gram.total().0, &fit.priors)?;
-        Some(Fit { gram, covariance, ..fit.clone() })
-    }
-
     /// A size of the `i`-th member is beyond what the drives disagree about.
     fn stands_out(&self, fit: &Fit, member: usize) -> bool {
-        let Some(plain) = self.plain(fit, member) else { return false };
-        let variances = self.variances(&plain);
+        let variances = self.variances(fit);
         let sizes = CATALOGUE[fit.set[member]].sizes;
         fit.free.iter().zip(&variances).any(|(p, v)| {
             let x = fit.theta[*p as usize] - self.zero()[*p as usize];
@@ -178,12 +167,17 @@ impl dyn Evidence + '_ {
         })
     }
 
-    /// Gain of the `i`-th member on unseen halves of the drives, nats.
+    /// Gain of the `i`-th member on unseen halves of the drives, nats. Its own course is not taken
+    /// out: what a half can take of it is no question of whether it is there.
     fn folds(&self, fit: &Fit, member: usize) -> f64 {
         if self.drives() < 2 {
             return f64::INFINITY;
         }
-        let Some(Fit { gram, .. }) = self.plain(fit, member) else { return f64::NEG_INFINITY };
+        let keep: Vec<usize> = (0..=fit.free.len()).collect();
+        let others = fit.course.without(CATALOGUE[fit.set[member]].sizes);
+        let Some(gram) = others.taken_out(&fit.whole, &keep, &fit.theta, self.zero()) else {
+            return f64::NEG_INFINITY;
+        };
         let zero = self.zero();
         let sigma = prior(&fit.free);
         // Shapes stay where they are: with them a size of nothing is no effect, as it is not along

@@ -78,21 +78,6 @@ impl Prior {
     }
 }
 
-/// Covariance of parameters with this information and these priors, and the logarithm of the
-/// determinant of the information in the priors' deviations.
-pub(crate) fn posterior(a: &DMatrix<f64>, priors: &[Prior]) -> Option<(DMatrix<f64>, f64)> {
-    let k = priors.len();
-    let scaled = DMatrix::from_fn(k, k, |i, j| {
-        priors[i].sigma * a[(i, j)] * priors[j].sigma + if i == j { 1.0 } else { 0.0 }
-    });
-    let chol = scaled.cholesky()?;
-    let log_det = 2.0 * (0..k).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
-    let inverse = chol.inverse();
-    let covariance =
-        DMatrix::from_fn(k, k, |i, j| priors[i].sigma * inverse[(i, j)] * priors[j].sigma);
-    Some((covariance, log_det))
-}
-
 /// A step that was tried.
 #[derive(Clone, Copy)]
 struct Step {
@@ -290,7 +275,15 @@ impl dyn Evidence + '_ {
     /// Evidence and covariance where a fit has ended (Laplace).
     fn fitted(&self, set: &[usize], free: Free, at: Standing, zero_norm: f64) -> Option<Fit> {
         let (a, _, norm) = at.gram.total();
-        let (covariance, log_det) = posterior(&a, &free.priors)?;
+        let k = free.params.len();
+        let sigma: Vec<f64> = free.priors.iter().map(|p| p.sigma).collect();
+        let scaled = DMatrix::from_fn(k, k, |i, j| {
+            sigma[i] * a[(i, j)] * sigma[j] + if i == j { 1.0 } else { 0.0 }
+        });
+        let chol = scaled.cholesky()?;
+        let log_det: f64 = 2.0 * (0..k).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
+        let inverse = chol.inverse();
+        let covariance = DMatrix::from_fn(k, k, |i, j| sigma[i] * inverse[(i, j)] * sigma[j]);
         Some(Fit {
             set: set.to_vec(),
             theta: at.theta,
