@@ -192,7 +192,8 @@ class VectorEnv(
         after it; the environments stay as they are. Kinematic environments only.
 
         Args:
-            base: `keep`, `rules:50`, `mobil`, `rollout`, or `dqn:FILE` with a learned policy's weights.
+            base: `keep`, `rules:50`, `mobil`, `rollout`, `dqn` for the shipped policy,
+                or `dqn:FILE` with the weights of another one.
             horizon_s: Length of a rollout, s.
             rollouts: Rollouts per action, each with other draws of the traffic to come.
             discount_frac_s: A reward is worth this part a second later.

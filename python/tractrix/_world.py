@@ -37,7 +37,7 @@ class World:
         on_traffic_failure: When the traffic source fails: `stop`, or `native` (the native engine
             goes on).
         decider: Who decides on lane changes: `keep`, `rules:50`, `rules:100`, `rules:150`, `mobil`,
-            `rollout`, `external` (`request_lane_change`), or `dqn:FILE`.
+            `rollout`, `external` (`request_lane_change`), `dqn`, or `dqn:FILE`.
         speed_planner: Who sets the reference speed: `cruise` or `predictive`.
         duration_s: Ends the run after this simulated time, s.
 

@@ -60,10 +60,12 @@ fn the_summary_has_the_keys_of_the_contract() {
 fn a_learned_decider_drives_from_its_files() {
     let weights =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../planner/tests/fixtures/policy.safetensors");
-    let decider = format!("dqn:{}", weights.display());
-    let summary = summary_of(&["--headless", "--duration", "40", "--decider", &decider]);
-    assert_eq!(summary["collisions"], 0);
-    assert_eq!(summary["end_reason"], "time_over");
+    let file = format!("dqn:{}", weights.display());
+    for decider in [file.as_str(), "dqn"] {
+        let summary = summary_of(&["--headless", "--duration", "40", "--decider", decider]);
+        assert_eq!(summary["collisions"], 0, "{decider}");
+        assert_eq!(summary["end_reason"], "time_over", "{decider}");
+    }
 }
 
 #[test]

@@ -115,13 +115,17 @@ impl Overrides<'_> {
 }
 
 /// A decider and its file of weights by their words: `keep`, `mobil`, `rollout`, `external`, `rules:` with the
-/// paper's distance in metres, or `dqn:` with a file of weights.
+/// paper's distance in metres, `dqn` for the trained policy of the program, or `dqn:` with a file of
+/// weights.
 pub(crate) fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), SimError> {
     let kind = match text.split_once(':') {
         None if text == "keep" => DeciderKind::KeepLane,
         None if text == "mobil" => DeciderKind::Mobil(MobilConfig::default()),
         None if text == "rollout" => DeciderKind::Rollout(RolloutConfig::default()),
         None if text == "external" => DeciderKind::External,
+        None if text == "dqn" => {
+            return Ok((DeciderKind::Dqn, Some(crate::world::BUILTIN_POLICY.to_owned())));
+        }
         Some(("dqn", file)) if !file.is_empty() => {
             return Ok((DeciderKind::Dqn, Some(file.to_owned())));
         }
@@ -130,7 +134,7 @@ pub(crate) fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), 
         }
         _ => {
             let known =
-                "keep, rules:50, rules:100, rules:150, mobil, rollout, external or dqn:FILE";
+                "keep, rules:50, rules:100, rules:150, mobil, rollout, external, dqn or dqn:FILE";
             return Err(refused("decider", text, &format!("expected {known}")));
         }
     };

@@ -57,7 +57,7 @@ pub struct Scenario {
     #[serde(default)]
     pub stack: planner::StackConfig,
     /// Weights of the learned decider (`stack.decider = "dqn"`): `policy.safetensors`, with its
-    /// `policy.json` beside it.
+    /// `policy.json` beside it, or `builtin:table2`, the trained one that the program brings along.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub policy_file: Option<String>,
     /// The other vehicles.
@@ -272,7 +272,9 @@ impl Scenario {
                 *file = folder.join(&*file).display().to_string();
             }
         }
-        if let Some(file) = &mut self.policy_file {
+        if let Some(file) = &mut self.policy_file
+            && file != crate::world::BUILTIN_POLICY
+        {
             *file = folder.join(&*file).display().to_string();
         }
         self.traffic.resolve_paths(folder);

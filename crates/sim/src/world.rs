@@ -322,11 +322,19 @@ pub fn stack_of(
     })
 }
 
-/// Weights of the learned decider, with the `.json` beside them.
+/// The trained policy that the program brings along (`policies/table2`).
+pub(crate) const BUILTIN_POLICY: &str = "builtin:table2";
+const BUILTIN_WEIGHTS: &[u8] = include_bytes!("../../../policies/table2.safetensors");
+const BUILTIN_SIDECAR: &str = include_str!("../../../policies/table2.json");
+
+/// Weights of the learned decider, with the `.json` beside them, or `builtin:table2`.
 ///
 /// # Errors
 /// [`SimError`] names the file that cannot be read or used.
 pub fn read_policy(file: &Path) -> Result<planner::decider::Policy, SimError> {
+    if file == Path::new(BUILTIN_POLICY) {
+        return Ok(planner::decider::Policy::from_files(BUILTIN_WEIGHTS, BUILTIN_SIDECAR)?);
+    }
     let io = |path: &Path| {
         let path = path.to_owned();
         move |source| SimError::Io { path, source }

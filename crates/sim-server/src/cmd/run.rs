@@ -41,8 +41,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "WHAT")]
     on_traffic_failure: Option<String>,
     /// Who decides on lane changes: keep, rules:50, rules:100, rules:150, mobil, rollout (drives
-    /// ahead what each change leads to), external (the dashboard and its API), or dqn:FILE
-    /// (policy.safetensors, policy.json beside it).
+    /// ahead what each change leads to), external (the dashboard and its API), dqn (the trained
+    /// policy) or dqn:FILE (policy.safetensors, policy.json beside it).
     #[arg(long)]
     decider: Option<String>,
     /// Who sets the reference speed: cruise or predictive.
