@@ -25,32 +25,42 @@ const TAU: f64 = 0.03;
 /// Standard deviation of a cause's course along a signal, in its size, where physics gives its law.
 const RHO: f64 = 0.05;
 /// The same where the law is what a maker chose or a component happens to do, and the catalogue's is
-/// one of many: a quarter more or less is still that cause.
+/// one of many: a quarter more or less is still that cause. Not along a signal over which its form is
+/// fitted: form and course would be free of each other.
 const RHO_SHAPE: f64 = 0.25;
 
-/// Standard deviation of the course of a cause with this size.
-fn rho(p: P) -> f64 {
-    match p {
-        P::FanPower
-        | P::Friction
-        | P::EngineBrakeScale
-        | P::Altitude
-        | P::HeatAir
-        | P::HeatCoolant
-        | P::TurboLag
-        | P::PedalDelay
-        | P::ShiftTime
-        | P::FuelLow
-        | P::BrakeDelay
-        | P::Fade
-        | P::RetarderStage
-        | P::RetarderBrake
-        | P::RetarderCoast
-        | P::FreePlay
-        | P::SteerLag => RHO_SHAPE,
+/// Standard deviation of the course of a cause with this size along one of its [`signals`].
+fn rho(p: P, signal: &str) -> f64 {
+    match (p, signal) {
+        // The form along these is fitted: onset and slope, threshold and hysteresis, knee.
+        (P::FanPower | P::HeatCoolant, "coolant_temp_degc")
+        | (P::Altitude, "gps_altitude_m")
+        | (P::HeatAir, "ambient_temp_degc")
+        | (P::FuelLow, "engine_torque_percent") => RHO,
+        (
+            P::FanPower
+            | P::Friction
+            | P::EngineBrakeScale
+            | P::Altitude
+            | P::HeatAir
+            | P::HeatCoolant
+            | P::TurboLag
+            | P::PedalDelay
+            | P::ShiftTime
+            | P::FuelLow
+            | P::BrakeDelay
+            | P::Fade
+            | P::RetarderStage
+            | P::RetarderBrake
+            | P::RetarderCoast
+            | P::FreePlay
+            | P::SteerLag,
+            _,
+        ) => RHO_SHAPE,
         _ => RHO,
     }
 }
+
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
 
@@ -88,8 +98,8 @@ struct Effect {
     p: P,
     /// Its sensitivity.
     column: usize,
-    /// Its hats, per signal.
-    hats: Vec<Vec<usize>>,
+    /// Its hats per signal, with the deviation of its course there.
+    hats: Vec<(f64, Vec<usize>)>,
 }
 
 /// Random effects of the sizes among some directions.
@@ -106,13 +116,14 @@ impl Course {
                 continue;
             }
             let mut hats = Vec::new();
-            for signal in signals(p).iter().filter_map(|s| signal(s)) {
+            for name in signals(p) {
+                let Some(signal) = signal(name) else { continue };
                 let first = directions.len() + 1;
                 for knot in 0..HATS {
                     let hat = Some(Hat { signal, knot });
                     directions.push(Direction { hat, ..directions[j].clone() });
                 }
-                hats.push((first..first + HATS).collect());
+                hats.push((rho(p, name), (first..first + HATS).collect()));
             }
             out.push(Effect { p, column: j + 1, hats });
         }
@@ -124,7 +135,7 @@ impl Course {
         let mut out = self.clone();
         for e in &mut out.0 {
             e.column += more;
-            e.hats.iter_mut().flatten().for_each(|j| *j += more);
+            e.hats.iter_mut().flat_map(|h| &mut h.1).for_each(|j| *j += more);
         }
         out
     }
@@ -136,7 +147,9 @@ impl Course {
         for e in &self.0 {
             let size = (theta[e.p as usize] - zero[e.p as usize]).abs();
             out[e.column - 1] = TAU * size;
-            e.hats.iter().flatten().for_each(|j| out[j - 1] = rho(e.p) * size);
+            for (rho, hats) in &e.hats {
+                hats.iter().for_each(|j| out[j - 1] = rho * size);
+            }
         }
         out
     }
@@ -164,10 +177,10 @@ impl Course {
         for e in &self.0 {
             let size = (theta[e.p as usize] - zero[e.p as usize]).abs();
             between.push((e.column, TAU * size));
-            for hats in &e.hats {
+            for (rho, hats) in &e.hats {
                 let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
                 let part = (shows(e.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-                along.extend(hats.iter().map(|j| (*j, rho(e.p) * size * part)));
+                along.extend(hats.iter().map(|j| (*j, rho * size * part)));
             }
         }
         gram.marginal(keep, &between, &along)

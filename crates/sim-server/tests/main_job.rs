@@ -129,14 +129,17 @@ fn signal(process: &Child, name: &str) {
     assert!(Command::new("kill").args(kill).status().unwrap().success());
 }
 
-/// A hangup (the terminal is closed) killed the run and left a torn recording.
+/// A hangup (the terminal is closed) killed the run and left a torn recording. The tests themselves may
+/// run under `nohup`.
 #[test]
 fn ctrl_c_sigterm_and_a_hangup_finish_the_recording_and_the_summary() {
     for name in ["INT", "TERM", "HUP"] {
         let folder = tempfile::tempdir().unwrap();
         let recording = folder.path().join("run.mcap");
         let arguments = ["run", "--headless", "--pace", "20", "--out"];
-        let mut run = under_way(program().args(arguments).arg(folder.path()), &recording, 600_000);
+        let mut command = Command::new("env");
+        command.args(["--default-signal=HUP", env!("CARGO_BIN_EXE_sim-server")]);
+        let mut run = under_way(command.args(arguments).arg(folder.path()), &recording, 600_000);
         signal(&run, name);
         assert_eq!(run.wait().unwrap().code(), Some(0));
         let summary = json(&folder.path().join("summary.json"));
