@@ -507,6 +507,8 @@ def test_light_and_dark_follow_the_system_or_the_choice_and_can_be_read(
         )
         page.reload()
         assert luminance(page, "body") > 200, "the choice is kept"
+        # before its scripts run the page hears no key
+        plots_are_there(page)
         page.keyboard.press("t")
         assert page.inner_text("#theme") == "Theme: dark"
         assert luminance(page, "body") < 40
