@@ -15,7 +15,6 @@ number of environment threads.
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 import sys
@@ -30,6 +29,7 @@ import torch
 
 from tractrix import VectorEnv
 from tractrix.evaluate.drive import TABLE2, drive
+from tractrix.train._command import command
 from tractrix.train.export import export
 from tractrix.train.network import QNetwork
 
@@ -288,32 +288,13 @@ class Training:
 
 
 def main() -> None:
-    """The command line: one option for every setting."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tractrix.train.rollout",
-        description="Trains a lane-change policy on rollout advantages.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    """The command line."""
+    command(
+        "rollout",
+        "Trains a lane-change policy on rollout advantages.",
+        Settings,
+        Training,
     )
-    for field in dataclasses.fields(Settings):
-        default: Any = field.default
-        several = isinstance(default, tuple)
-        parser.add_argument(
-            "--" + field.name.replace("_", "-"),
-            type=str if several else type(default),
-            nargs="+" if several else None,
-            default=default,
-            help=" ",
-        )
-    parser.add_argument("--out", type=Path, required=True, help="folder of its files")
-    parser.add_argument("--threads", type=int, default=1, help="of the environments")
-    parser.add_argument("--resume", action="store_true", help="go on from --out")
-    parser.add_argument("--tensorboard", action="store_true", help="also write events")
-    given = vars(parser.parse_args())
-    own = {
-        name: given.pop(name) for name in ("out", "threads", "resume", "tensorboard")
-    }
-    given["scenarios"] = tuple(given["scenarios"])
-    Training(Settings(**given), own.pop("out"), **own).run()
 
 
 if __name__ == "__main__":
