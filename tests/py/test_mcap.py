@@ -58,10 +58,11 @@ def climb(q: Any) -> float:
 
 def test_every_tick_of_the_run_is_in_the_recording_once(short_run: Path) -> None:
     counts = Counter(topic for topic, _, _ in messages(short_run / "run.mcap"))
-    for topic in ("/clock", "/tf", "/odom", "/truck/state", "/truck/plan"):
+    for topic in ("/clock", "/tf", "/odom", "/imu", "/truck/state", "/truck/plan"):
         assert counts[topic] == TICKS, (topic, counts)
     for topic in ("/plan/path", "/scene", "/markers"):
         assert counts[topic] == TICKS / 10, (topic, counts)
+    assert counts["/diagnostics"] == TICKS / 100, counts
     assert counts["/tf_static"] == 1
     assert counts["/fix"] == TICKS / 10, counts
 

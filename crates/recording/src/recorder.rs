@@ -12,6 +12,7 @@ use crate::file::McapFile;
 use crate::inputs::{BUS_RECORD, BusTrace, DRIVER_KEY, StepNotes};
 use crate::schedule::Schedule;
 use crate::telemetry::Scenery;
+use crate::topic::TopicMessage;
 use crate::writer::{Note, Queued, Record, RunEnd, Writer};
 
 /// What a recording says about its run.
@@ -25,7 +26,13 @@ pub struct RunHeader {
     pub scenery: Scenery,
     /// The bus that the truck is driven over.
     pub bus: Option<BusHeader>,
+    /// Who hears the telemetry while it is written.
+    pub listener: Option<Listener>,
 }
+
+/// Hears every message of [`messages`](crate::messages) with the bytes that the file gets, in the
+/// writer's thread: a network's sink, which must not block.
+pub type Listener = Box<dyn FnMut(&TopicMessage) + Send>;
 
 /// What a recording says about the bus that the truck is driven over.
 pub struct BusHeader {
@@ -106,7 +113,7 @@ impl Recording {
             trace = Some((bus.trace, name));
         }
         let name = trace.as_ref().map(|(_, name)| name.as_str());
-        let writer = Writer::open(file, header.scenery, name)?;
+        let writer = Writer::open(file, header.scenery, name, header.listener)?;
         let (queue, queued) = sync_channel(QUEUE);
         let (end, run_end) = sync_channel(1);
         let (done, ended) = sync_channel(1);
@@ -309,7 +316,7 @@ mod tests {
 
     const TICK: i64 = 10_000_000;
 
-    fn recording(disk: &Hanging, end_within_s: f64) -> Recording {
+    fn recording(disk: &Hanging, end_within_s: f64, listener: Option<Listener>) -> Recording {
         let limits = VehicleLimits::from_sheet("sheet", &crate::tests::sheet()).unwrap();
         let header = RunHeader {
             metadata: BTreeMap::new(),
@@ -320,6 +327,7 @@ mod tests {
                 geodesy: None,
             },
             bus: None,
+            listener,
         };
         let file = McapFile::on(Path::new("disk"), Box::new(disk.clone())).unwrap();
         Recording::on(file, Path::new("disk"), header, Backlog::Drop { end_within_s }).unwrap()
@@ -365,7 +373,7 @@ mod tests {
     #[test]
     fn a_disk_that_hangs_holds_nothing_up_and_the_gap_is_in_the_file() {
         let disk = Hanging::default();
-        let mut recording = recording(&disk, 60.0);
+        let mut recording = recording(&disk, 60.0, None);
         drive(&mut recording, 0..100);
         disk.hang(true);
         let began = Instant::now();
@@ -388,10 +396,36 @@ mod tests {
         assert!(text.contains("{\"end\": true}"), "the end is in the file");
     }
 
+    /// Viewers of a run see what the file holds, byte for byte, and the file alone holds the inputs.
+    #[test]
+    fn a_listener_hears_every_message_with_the_bytes_of_the_file() {
+        let (heard, hears) = std::sync::mpsc::channel();
+        let disk = Hanging::default();
+        let listener = move |message: &TopicMessage| heard.send(message.clone()).unwrap();
+        let mut recording = recording(&disk, 60.0, Some(Box::new(listener)));
+        drive(&mut recording, 0..100);
+        recording.finish("{}").unwrap();
+        let heard: Vec<TopicMessage> = hears.into_iter().collect();
+        assert_eq!(heard[0].topic.name, "/tf_static");
+        assert_eq!(heard.iter().filter(|m| m.topic.name == "/clock").count(), 100);
+        assert!(heard.iter().all(|m| !m.topic.name.starts_with("/stack/")));
+        let file = disk.when_it_goes(|file| file.get_ref().clone());
+        let mut heard = heard.iter();
+        for message in mcap::MessageStream::new(&file).unwrap() {
+            let message = message.unwrap();
+            if !message.channel.topic.starts_with("/stack/") {
+                let live = heard.next().unwrap();
+                assert_eq!(live.topic.name, message.channel.topic);
+                assert_eq!(live.cdr, *message.data);
+            }
+        }
+        assert!(heard.next().is_none());
+    }
+
     #[test]
     fn a_disk_that_never_wakes_up_does_not_keep_who_ends_waiting() {
         let disk = Hanging::default();
-        let mut recording = recording(&disk, 0.2);
+        let mut recording = recording(&disk, 0.2, None);
         drive(&mut recording, 0..100);
         disk.hang(true);
         drive(&mut recording, 100..200);

@@ -6,10 +6,11 @@ use byteorder::LittleEndian;
 
 use crate::error::RecordingError;
 use crate::ros::Message;
+use crate::ros::diagnostic::DiagnosticArray;
 use crate::ros::input::{BusTick, CanFrame, StackInput, StackLimits, StackScene};
 use crate::ros::marker::MarkerArray;
 use crate::ros::schema::schema_text;
-use crate::ros::standard::{Clock, NavSatFix, Odometry, Path, TfMessage};
+use crate::ros::standard::{Clock, Imu, NavSatFix, Odometry, Path, TfMessage};
 use crate::ros::truck::{PlanState, Scene, TruckState};
 
 /// CDR, little endian, plain (OMG DDSI-RTPS 2.3, 10.5).
@@ -89,6 +90,8 @@ pub(crate) const FIX: TopicOf<NavSatFix> = TopicOf::new("/fix");
 pub(crate) const CLOCK: TopicOf<Clock> = TopicOf::new("/clock");
 pub(crate) const FRAMES: TopicOf<TfMessage> = TopicOf::new("/tf");
 pub(crate) const ODOMETRY: TopicOf<Odometry> = TopicOf::new("/odom");
+pub(crate) const IMU: TopicOf<Imu> = TopicOf::new("/imu");
+pub(crate) const DIAGNOSTICS: TopicOf<DiagnosticArray> = TopicOf::new("/diagnostics");
 pub(crate) const TRUCK: TopicOf<TruckState> = TopicOf::new("/truck/state");
 pub(crate) const PLAN: TopicOf<PlanState> = TopicOf::new("/truck/plan");
 pub(crate) const PATH: TopicOf<Path> = TopicOf::new("/plan/path");
@@ -103,12 +106,14 @@ pub(crate) const CAN_FRAMES: TopicOf<CanFrame> = TopicOf::new("/can/BUS/frames")
 pub(crate) const CAN_TICKS: TopicOf<BusTick> = TopicOf::new("/can/BUS/ticks");
 
 /// Every topic, in the order in which a file opens them.
-pub const TOPICS: [Topic; 14] = [
+pub const TOPICS: [Topic; 16] = [
     STATIC_FRAMES.topic,
     FIX.topic,
     CLOCK.topic,
     FRAMES.topic,
     ODOMETRY.topic,
+    IMU.topic,
+    DIAGNOSTICS.topic,
     TRUCK.topic,
     PLAN.topic,
     PATH.topic,

@@ -7,10 +7,11 @@ use tractrix_core::{EgoState, Plan, Scene, Tick, Time};
 use crate::error::RecordingError;
 use crate::file::McapFile;
 use crate::inputs::{BusCall, SceneWriter, StepNote, call_messages};
+use crate::recorder::Listener;
 use crate::ros::input::{StackLimits, StackScene};
 use crate::schedule::Due;
 use crate::telemetry::{Scenery, lanes_at_start, messages, static_frames};
-use crate::topic::{CAN_FRAMES, CAN_TICKS, FIX, INPUT, LIMITS, TOPICS, VEHICLES};
+use crate::topic::{CAN_FRAMES, CAN_TICKS, FIX, INPUT, LIMITS, TOPICS, TopicMessage, VEHICLES};
 
 /// Name of the record that says how many notes were left out at its place.
 pub(crate) const GAP_RECORD: &str = "gap";
@@ -55,6 +56,7 @@ pub(crate) struct Writer {
     scenery: Scenery,
     flush_due: Time,
     scenes: SceneWriter,
+    listener: Option<Listener>,
 }
 
 impl Writer {
@@ -64,10 +66,18 @@ impl Writer {
         mut file: McapFile,
         scenery: Scenery,
         bus: Option<&str>,
+        mut listener: Option<Listener>,
     ) -> Result<Self, RecordingError> {
         let [frames, others @ ..] = &TOPICS;
+        let mut telling = |message: &TopicMessage| {
+            if let Some(listener) = &mut listener {
+                listener(message);
+            }
+        };
         file.open(frames)?;
-        file.write(Time::ZERO, &static_frames(&scenery)?)?;
+        let message = static_frames(&scenery)?;
+        file.write(Time::ZERO, &message)?;
+        telling(&message);
         for topic in others.iter().filter(|t| scenery.geodesy.is_some() || **t != FIX.topic) {
             file.open(topic)?;
         }
@@ -77,9 +87,11 @@ impl Writer {
         }
         for message in lanes_at_start(&scenery)? {
             file.write(Time::ZERO, &message)?;
+            telling(&message);
         }
         file.flush()?;
-        Ok(Self { file, scenery, flush_due: FLUSH_PERIOD, scenes: SceneWriter::default() })
+        let (flush_due, scenes) = (FLUSH_PERIOD, SceneWriter::default());
+        Ok(Self { file, scenery, flush_due, scenes, listener })
     }
 
     /// Writes until the sender is gone, then the end if there is one; says up to when the file is
@@ -134,6 +146,9 @@ impl Writer {
                     let tick = Tick { now, ego: &ego, scene: &scene, plan: &plan };
                     for message in messages(&tick, &self.scenery, due)? {
                         self.file.write(now, &message)?;
+                        if let Some(listener) = &mut self.listener {
+                            listener(&message);
+                        }
                     }
                     if now >= self.flush_due {
                         self.flush_due = now.plus_nanos(FLUSH_PERIOD.0);

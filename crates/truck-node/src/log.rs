@@ -81,7 +81,7 @@ impl Log {
         let trace = BusTrace::default();
         let bus = BusHeader { vehicle: bus_name(&args.can), driver_json, trace: trace.clone() };
         let metadata = metadata.map(|(key, value)| (key.to_owned(), value)).into();
-        let header = RunHeader { metadata, files, scenery, bus: Some(bus) };
+        let header = RunHeader { metadata, files, scenery, bus: Some(bus), listener: None };
         let recording = Recording::create(&file, header, BACKLOG).map_err(Failure::input)?;
         Ok(Self(Some((recording, trace))))
     }

@@ -1,6 +1,7 @@
 //! The messages of a recording: plain serde structs whose field order is that of the `.msg` files,
 //! so that CDR bytes are those of a ROS 2 node, and the texts that describe them.
 
+pub(crate) mod diagnostic;
 pub(crate) mod input;
 pub(crate) mod marker;
 pub(crate) mod schema;

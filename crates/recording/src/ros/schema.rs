@@ -50,6 +50,24 @@ const DEFINITIONS: &[(&str, &str)] = &[
          uint8 COVARIANCE_TYPE_APPROXIMATED=1\nuint8 COVARIANCE_TYPE_DIAGONAL_KNOWN=2\n\
          uint8 COVARIANCE_TYPE_KNOWN=3\nuint8 position_covariance_type\n",
     ),
+    (
+        "sensor_msgs/Imu",
+        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\n\
+         float64[9] orientation_covariance\ngeometry_msgs/Vector3 angular_velocity\n\
+         float64[9] angular_velocity_covariance\n\
+         geometry_msgs/Vector3 linear_acceleration\n\
+         float64[9] linear_acceleration_covariance\n",
+    ),
+    ("diagnostic_msgs/KeyValue", "string key\nstring value\n"),
+    (
+        "diagnostic_msgs/DiagnosticStatus",
+        "byte OK=0\nbyte WARN=1\nbyte ERROR=2\nbyte STALE=3\nbyte level\nstring name\n\
+         string message\nstring hardware_id\ndiagnostic_msgs/KeyValue[] values\n",
+    ),
+    (
+        "diagnostic_msgs/DiagnosticArray",
+        "std_msgs/Header header\ndiagnostic_msgs/DiagnosticStatus[] status\n",
+    ),
     ("visualization_msgs/UVCoordinate", "float32 u\nfloat32 v\n"),
     ("visualization_msgs/MeshFile", "string filename\nuint8[] data\n"),
     ("visualization_msgs/MarkerArray", "visualization_msgs/Marker[] markers\n"),
@@ -72,14 +90,14 @@ const DEFINITIONS: &[(&str, &str)] = &[
         "std_msgs/Header header\nuint32 id\nbool is_rtr\nbool is_extended\nbool is_error\n\
          uint8 dlc\nuint8[8] data\n",
     ),
-    ("truck_msgs/TruckState", include_str!("../../msg/truck_msgs/TruckState.msg")),
-    ("truck_msgs/PlanState", include_str!("../../msg/truck_msgs/PlanState.msg")),
-    ("truck_msgs/Scene", include_str!("../../msg/truck_msgs/Scene.msg")),
-    ("truck_msgs/SceneVehicle", include_str!("../../msg/truck_msgs/SceneVehicle.msg")),
-    ("truck_msgs/StackInput", include_str!("../../msg/truck_msgs/StackInput.msg")),
-    ("truck_msgs/StackScene", include_str!("../../msg/truck_msgs/StackScene.msg")),
-    ("truck_msgs/StackLimits", include_str!("../../msg/truck_msgs/StackLimits.msg")),
-    ("truck_msgs/BusTick", include_str!("../../msg/truck_msgs/BusTick.msg")),
+    ("truck_msgs/TruckState", include_str!("../../msg/truck_msgs/msg/TruckState.msg")),
+    ("truck_msgs/PlanState", include_str!("../../msg/truck_msgs/msg/PlanState.msg")),
+    ("truck_msgs/Scene", include_str!("../../msg/truck_msgs/msg/Scene.msg")),
+    ("truck_msgs/SceneVehicle", include_str!("../../msg/truck_msgs/msg/SceneVehicle.msg")),
+    ("truck_msgs/StackInput", include_str!("../../msg/truck_msgs/msg/StackInput.msg")),
+    ("truck_msgs/StackScene", include_str!("../../msg/truck_msgs/msg/StackScene.msg")),
+    ("truck_msgs/StackLimits", include_str!("../../msg/truck_msgs/msg/StackLimits.msg")),
+    ("truck_msgs/BusTick", include_str!("../../msg/truck_msgs/msg/BusTick.msg")),
 ];
 
 fn definition(name: &str) -> Option<&'static str> {

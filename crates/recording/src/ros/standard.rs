@@ -100,6 +100,11 @@ impl Quaternion {
         }
     }
 
+    /// A vector of the outer frame as this rotated frame sees it.
+    pub(crate) fn turn_back(self, v: Vector3) -> Vector3 {
+        Self { x: -self.x, y: -self.y, z: -self.z, w: self.w }.turn(v)
+    }
+
     /// The rotation `other` as seen from the frame turned by this one.
     pub(crate) fn inverse_times(self, other: Self) -> Self {
         let (a, b) = (self, other);
@@ -226,6 +231,18 @@ pub(crate) struct NavSatFix {
     pub(crate) position_covariance_type: u8,
 }
 
+/// `sensor_msgs/msg/Imu`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct Imu {
+    pub(crate) header: Header,
+    pub(crate) orientation: Quaternion,
+    pub(crate) orientation_covariance: [f64; 9],
+    pub(crate) angular_velocity: Vector3,
+    pub(crate) angular_velocity_covariance: [f64; 9],
+    pub(crate) linear_acceleration: Vector3,
+    pub(crate) linear_acceleration_covariance: [f64; 9],
+}
+
 macro_rules! names {
     ($($ty:ty: $package:literal / $name:literal;)*) => {$(
         impl Message for $ty {
@@ -242,6 +259,7 @@ names! {
     Odometry: "nav_msgs" / "Odometry";
     Path: "nav_msgs" / "Path";
     NavSatFix: "sensor_msgs" / "NavSatFix";
+    Imu: "sensor_msgs" / "Imu";
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Own messages, for what has no standard one; fields as in `msg/truck_msgs/*.msg`.
+//! Own messages, for what has no standard one; fields as in `msg/truck_msgs/msg/*.msg`.
 
 use serde::Serialize;
 use tractrix_core::{

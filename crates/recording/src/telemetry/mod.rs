@@ -3,6 +3,7 @@
 
 mod bodies;
 mod geo;
+mod health;
 mod lanes;
 mod motion;
 
@@ -16,16 +17,17 @@ pub use bodies::Combination;
 pub use geo::Geodesy;
 
 use self::bodies::{ego_markers, neighbour_marker};
+use self::health::diagnostics;
 use self::lanes::lane_markers;
-use self::motion::{clock, fix, odometry, path, static_transforms, transforms};
+use self::motion::{clock, fix, imu, odometry, path, static_transforms, transforms};
 use crate::error::RecordingError;
 use crate::ros::marker::MarkerArray;
 use crate::ros::standard::{Header, Stamp};
 use crate::ros::truck::{PlanState, Scene, SceneVehicle, TruckState};
 use crate::schedule::{Due, LANES_AT_START_M};
 use crate::topic::{
-    CLOCK, FIX, FRAMES, LANES, MARKERS, ODOMETRY, PATH, PLAN, SCENE, STATIC_FRAMES, TRUCK,
-    TopicMessage,
+    CLOCK, DIAGNOSTICS, FIX, FRAMES, IMU, LANES, MARKERS, ODOMETRY, PATH, PLAN, SCENE,
+    STATIC_FRAMES, TRUCK, TopicMessage,
 };
 
 /// How far around the truck the lane lines are repeated, m.
@@ -55,6 +57,7 @@ pub fn messages(
         CLOCK.encode(&clock(tick.now))?,
         FRAMES.encode(&transforms(tick, scenery))?,
         ODOMETRY.encode(&odometry(tick, scenery))?,
+        IMU.encode(&imu(tick, scenery))?,
         TRUCK.encode(&truck_state(tick, scenery))?,
         PLAN.encode(&plan_state(tick))?,
     ];
@@ -65,6 +68,9 @@ pub fn messages(
         if let Some(fix) = fix(tick, scenery) {
             messages.push(FIX.encode(&fix)?);
         }
+    }
+    if due.diagnostics {
+        messages.push(DIAGNOSTICS.encode(&diagnostics(tick))?);
     }
     if due.lanes {
         let s_m = tick.ego.s_m;

@@ -1,12 +1,13 @@
 //! Time, frames, motion and position on the earth.
 
-use tractrix_core::{Tick, Time};
+use tractrix_core::{GRAVITY_M_S2, Tick, Time};
 
 use super::bodies::{Bodies, on_road};
 use super::{Scenery, in_map};
 use crate::ros::standard::{
-    Clock, Header, NavSatFix, NavSatStatus, Odometry, Path, Pose, PoseStamped, PoseWithCovariance,
-    Quaternion, Stamp, TfMessage, Transform, TransformStamped, Twist, TwistWithCovariance, Vector3,
+    Clock, Header, Imu, NavSatFix, NavSatStatus, Odometry, Path, Pose, PoseStamped,
+    PoseWithCovariance, Quaternion, Stamp, TfMessage, Transform, TransformStamped, Twist,
+    TwistWithCovariance, Vector3,
 };
 
 /// Variances of what the plant simulates and the recording copies: a millimetre, a hundredth of a
@@ -19,6 +20,8 @@ const ATTITUDE: f64 = 3e-4;
 /// as zero: grade 5 % at 22 m/s, a body that sways 2 degrees at 1 Hz.
 const VERTICAL_SPEED: f64 = 1.0;
 const SWAY: f64 = 0.05;
+/// Variance of the vertical acceleration, (m/s²)², whose changes are not simulated: 5 % of gravity.
+const HEAVE: f64 = 0.25;
 
 /// `/clock`.
 pub(super) fn clock(now: Time) -> Clock {
@@ -93,6 +96,28 @@ pub(super) fn odometry(tick: &Tick<'_>, scenery: &Scenery) -> Odometry {
     }
 }
 
+/// `/imu`: what a sensor at the reference point of the tractor measures, fixed to its body. A
+/// standing truck on level ground measures +g upwards (REP 145).
+pub(super) fn imu(tick: &Tick<'_>, scenery: &Scenery) -> Imu {
+    let ego = tick.ego;
+    let orientation = Bodies::of(ego, scenery).tractor.orientation;
+    let up = orientation.turn_back(Vector3 { x: 0.0, y: 0.0, z: GRAVITY_M_S2 });
+    let covariance = |[x, y, z]: [f64; 3]| [x, 0.0, 0.0, 0.0, y, 0.0, 0.0, 0.0, z];
+    Imu {
+        header: Header { stamp: Stamp::of(tick.now), frame_id: "base_link" },
+        orientation,
+        orientation_covariance: covariance([ATTITUDE, ATTITUDE, SIMULATED]),
+        angular_velocity: Vector3 { x: 0.0, y: 0.0, z: ego.yaw_rate_rad_s },
+        angular_velocity_covariance: covariance([SWAY, SWAY, SIMULATED]),
+        linear_acceleration: Vector3 {
+            x: ego.accel_x_m_s2 - ego.lateral_speed_m_s * ego.yaw_rate_rad_s + up.x,
+            y: ego.accel_y_m_s2 + up.y,
+            z: up.z,
+        },
+        linear_acceleration_covariance: covariance([SIMULATED, SIMULATED, HEAVE]),
+    }
+}
+
 fn diagonal(variances: [f64; 6]) -> [f64; 36] {
     let mut matrix = [0.0; 36];
     for (i, variance) in variances.into_iter().enumerate() {
@@ -126,4 +151,31 @@ pub(super) fn path(tick: &Tick<'_>, scenery: &Scenery) -> Path {
         PoseStamped { header: header.clone(), pose }
     });
     Path { header: header.clone(), poses: poses.collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use tractrix_core::{EgoState, Plan, Scene};
+
+    use super::*;
+    use crate::Combination;
+
+    /// On a slope a sensor at rest measures what holds the truck: gravity's reaction, tilted.
+    #[test]
+    fn a_truck_at_rest_measures_the_slope() {
+        let road = Arc::new(road::builtin::test_site());
+        let (s_m, scene, plan) = (807.0, Scene::default(), Plan::default());
+        let at = road.at(s_m, 0.0);
+        let ego =
+            EgoState { s_m, yaw_rad: at.heading_rad, accel_x_m_s2: 0.3, ..EgoState::default() };
+        let scenery = Scenery { road, combination: Combination::default(), geodesy: None };
+        let tick = Tick { now: Time::ZERO, ego: &ego, scene: &scene, plan: &plan };
+        let a = imu(&tick, &scenery).linear_acceleration;
+        let slope = GRAVITY_M_S2 * at.grade_rad.sin();
+        assert!(slope.abs() > 0.1 && (a.x - 0.3 - slope).abs() < 1e-9, "{a:?} {slope}");
+        let length_m_s2 = (a.x - 0.3).hypot(a.y).hypot(a.z);
+        assert!((length_m_s2 - GRAVITY_M_S2).abs() < 1e-12, "{a:?}");
+    }
 }

@@ -171,7 +171,7 @@ fn start_recording(
         None
     });
     let scenery = Scenery { road, combination, geodesy };
-    let header = RunHeader { metadata, files, scenery, bus };
+    let header = RunHeader { metadata, files, scenery, bus, listener: None };
     Ok(Recording::create(&out.begin("run.mcap")?, header, Backlog::Wait)?)
 }
 
