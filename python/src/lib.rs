@@ -13,9 +13,11 @@ mod diagnose;
 mod drives;
 mod ego;
 mod fault;
+mod plan;
 mod policy;
 mod scenario;
 mod scene;
+mod truck_model;
 mod world;
 
 /// What produced an output that this seed determines.
@@ -38,9 +40,13 @@ mod _native {
     #[pymodule_export]
     use crate::drives::drives_from_logs;
     #[pymodule_export]
+    use crate::plan::{plan_columns, plan_json};
+    #[pymodule_export]
     use crate::policy::{Policy, observation_hash};
     #[pymodule_export]
     use crate::scenario::{scenario_json, scenario_list};
+    #[pymodule_export]
+    use crate::truck_model::TruckModel;
     #[pymodule_export]
     use crate::world::{Snapshot, World};
 

@@ -18,10 +18,12 @@ from tractrix._fleet import diagnose_many
 from tractrix._native import GIT_REVISION as __git_revision__
 from tractrix._native import VERSION as __version__
 from tractrix._native import Snapshot
+from tractrix._plan import plan
 from tractrix._policy import Policy
 from tractrix._recording import read_run
 from tractrix._scenario import scenario, scenarios
 from tractrix._state import SCENE_DTYPE, Decision, Ego
+from tractrix._truck_model import TruckModel
 from tractrix._world import World
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ __all__ = [
     "Ego",
     "Policy",
     "Snapshot",
+    "TruckModel",
     "VectorEnv",
     "World",
     "__git_revision__",
@@ -40,6 +43,7 @@ __all__ = [
     "diagnose",
     "diagnose_many",
     "drives",
+    "plan",
     "read_run",
     "scenario",
     "scenarios",

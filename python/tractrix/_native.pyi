@@ -1,6 +1,6 @@
 """The native half of the package; see `python/src`. Not for users."""
 
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,18 @@ def drives_from_logs(
     min_drive_s: float,
     overwrite: bool,
 ) -> str: ...
+def plan_json(
+    truck: str,
+    road: str,
+    *,
+    mass_kg: float,
+    set_speed_m_s: float,
+    speed_min_m_s: float,
+    speed_max_m_s: float,
+    trip_time_s: float | None,
+    eco_roll: bool,
+) -> tuple[str, bytes]: ...
+def plan_columns() -> list[str]: ...
 def observation_hash(spec: str) -> str: ...
 
 class Policy:
@@ -46,6 +58,33 @@ class Policy:
     ) -> None: ...
 
 class Snapshot: ...
+
+class TruckModel:
+    def __new__(cls, truck: str, *, payload_kg: float) -> Self: ...
+    def about(self) -> tuple[str, float]: ...
+    def reset(
+        self, x_m: float, y_m: float, yaw_rad: float, speed_m_s: float
+    ) -> None: ...
+    def step(
+        self,
+        duration_s: float,
+        *,
+        accelerator_pedal_frac: float,
+        xbr_decel_m_s2: float,
+        steering_wheel_rad: float,
+        retarder_frac: float,
+        gear: int | None,
+        grade_rad: float,
+        bank_rad: float,
+        wind_x_m_s: float,
+        wind_y_m_s: float,
+        air_temperature_k: float,
+        air_pressure_pa: float,
+        altitude_m: float,
+        adhesion_coeff: float,
+    ) -> None: ...
+    def state(self) -> dict[str, Any]: ...
+    def copy(self) -> TruckModel: ...
 
 class Batch:
     def __new__(

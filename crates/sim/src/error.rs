@@ -65,6 +65,9 @@ pub enum SimError {
         /// What it must be.
         why: String,
     },
+    /// The trip cannot be planned.
+    #[error(transparent)]
+    Trip(#[from] planner::pcc::PccError),
     /// The stack cannot be built from its configuration.
     #[error("stack: {0}")]
     Stack(#[from] planner::PlannerError),

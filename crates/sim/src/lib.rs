@@ -58,6 +58,7 @@ mod sim_truck;
 mod tick_times;
 mod traffic;
 mod traffic_section;
+pub mod trip_plan;
 mod truck;
 mod world;
 
