@@ -12,7 +12,7 @@ use crate::fault::Fault;
 use crate::scenario::changed;
 
 /// Figures of an episode, in the order of [`row`].
-const FIGURES: [&str; 10] = [
+const FIGURES: [&str; 12] = [
     "decisions",
     "time_s",
     "reward_s",
@@ -23,6 +23,8 @@ const FIGURES: [&str; 10] = [
     "refused",
     "hard_braking_caused",
     "collided",
+    "collision_caused",
+    "fuel_g",
 ];
 
 fn row(stats: &EpisodeStats) -> [f64; FIGURES.len()] {
@@ -37,6 +39,8 @@ fn row(stats: &EpisodeStats) -> [f64; FIGURES.len()] {
         f64::from(stats.refused),
         f64::from(stats.hard_braking_caused),
         f64::from(u8::from(stats.collided)),
+        f64::from(u8::from(stats.collision_caused)),
+        stats.fuel_g.unwrap_or(f64::NAN),
     ]
 }
 

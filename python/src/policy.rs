@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use planner::decider::observation::ObservationSpec;
 use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
+use sim::SimError;
 
 use crate::fault::Fault;
 
@@ -25,15 +26,25 @@ pub(crate) fn observation_hash(spec: &str) -> Result<String, Fault> {
 #[pyclass(frozen, module = "tractrix._native")]
 pub(crate) struct Policy {
     inner: planner::decider::Policy,
+    sidecar: String,
 }
 
 #[pymethods]
 impl Policy {
-    /// Reads a file of weights and the `.json` beside it.
+    /// Reads a file of weights and the `.json` beside it, or `builtin:table2`.
     #[new]
     fn new(py: Python<'_>, file: PathBuf) -> PyResult<Self> {
-        let inner = py.detach(|| sim::read_policy(&file)).map_err(|e| Fault::of_input(&e))?;
-        Ok(Self { inner })
+        let read = || {
+            let (weights, sidecar) = sim::policy_files(&file)?;
+            let inner = planner::decider::Policy::from_files(&weights, &sidecar)?;
+            Ok(Self { inner, sidecar })
+        };
+        py.detach(read).map_err(|e: SimError| Fault::of_input(&e).into())
+    }
+
+    /// The text beside the weights.
+    fn sidecar(&self) -> &str {
+        &self.sidecar
     }
 
     /// The kind of environment that makes the policy's observation.

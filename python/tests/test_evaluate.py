@@ -64,30 +64,64 @@ def test_every_decider_gets_the_same_traffic() -> None:
 def test_the_files_of_an_evaluation(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["rules:50", "mobil", "imagined:keep"]
-    scenarios = ["table2-sparse-12.5", "table2-sparse-15"]
-    given = ["--seeds", "5", "--episode-s", "20", "--out", str(tmp_path)]
-    main([*given, "--deciders", *words, "--scenarios", *scenarios])
-    table = (tmp_path / "table.md").read_text()
+    scenarios = ["table2-sparse-12.5", "table2-medium-12.5"]
+    given = ["--seeds", "5", "--duration-s", "60", "--out", str(tmp_path)]
+    main([*given, "--deciders", "mobil,dqn", "ceiling:keep", "--scenarios", *scenarios])
+    table = (tmp_path / "table2.md").read_text()
     assert capsys.readouterr().out == table
     assert "| table2-sparse-12.5 | rules:50 |" in table and "4.4; 2.99 |" in table
-    results = json.loads((tmp_path / "results.json").read_text())
-    row = results["scenarios"]["table2-sparse-15"]["mobil"]["delta_speed_frac"]
+    assert "| 3.4; 3.02 |" in table, "the paper's network beside ours"
+    results = json.loads((tmp_path / "table2.json").read_text())
+    rows = {(row["scenario"], row["decider"]): row for row in results["rows"]}
+    words = ["rules:50", "mobil", "dqn", "ceiling:keep"]
+    assert list(rows) == [(name, word) for name in scenarios for word in words]
     with (tmp_path / "episodes.csv").open() as file:
         episodes = list(csv.DictReader(file))
-    assert len(episodes) == 2 * 3 * 5
+    assert len(episodes) == 2 * 4 * 5
 
-    def of(word: str) -> list[float]:
+    def of(word: str, name: str = "delta_speed_frac") -> list[float]:
         return [
-            float(episode["delta_speed_frac"])
+            float(episode[name])
             for episode in episodes
             if (episode["scenario"], episode["decider"]) == (scenarios[1], word)
         ]
 
-    assert row["mean"] == pytest.approx(np.mean(of("mobil")))
-    difference = np.mean(of("mobil")) - np.mean(of("rules:50"))
-    assert row["minus_reference"]["mean"] == pytest.approx(difference)
-    assert results["reference"] == "rules:50" and results["seeds"][0] == 2_000_000
+    row = rows[scenarios[1], "mobil"]
+    assert row["delta_speed_frac"] == pytest.approx(np.mean(of("mobil")))
+    assert row["distance_m"] == pytest.approx(np.sum(of("mobil", "distance_m")))
+    gained = np.mean(of("mobil")) - np.mean(of("rules:50"))
+    difference = row["minus_rules_50"]
+    assert difference["mean"] == pytest.approx(gained)
+    assert difference["low"] <= difference["mean"] <= difference["high"]
+    best = np.mean(of("ceiling:keep")) - np.mean(of("rules:50"))
+    assert best < 0.0 and row["kept_gain_frac"] == pytest.approx(gained / best)
+    assert rows[scenarios[1], "ceiling:keep"]["kept_gain_frac"] == pytest.approx(1.0)
+    own = rows[scenarios[1], "rules:50"]
+    assert own["kept_gain_frac"] is None and own["minus_rules_50"]["high"] == 0.0
+    assert all(
+        row["ego_caused_collisions"] <= row["collisions"] for row in rows.values()
+    )
+    assert results["seed"] == 0 and results["schema"] == 1
+    with (tmp_path / "table2.csv").open() as file:
+        flat = list(csv.DictReader(file))
+    assert float(flat[5]["minus_rules_50_mean"]) == pytest.approx(gained)
+    assert "fuel_g_km" not in flat[0], "a kinematic ego has no engine"
+
+
+def test_the_full_truck_has_fuel_and_another_interval_another_traffic(
+    tmp_path: Path,
+) -> None:
+    given = ["--seeds", "1", "--duration-s", "20", "--deciders", "mobil"]
+    given += ["--scenarios", "table2-medium-12.5", "--fidelity", "truck"]
+    main([*given, "--out", str(tmp_path / "a")])
+    main([*given, "--out", str(tmp_path / "b"), "--spawn-interval-s", "0.1"])
+    first, second = (
+        json.loads((tmp_path / name / "table2.json").read_text())["rows"][0]
+        for name in "ab"
+    )
+    # 8 to 120 l/100 km
+    assert 70.0 < first["fuel_g_km"] < 1_000.0 and first["minus_rules_50"] is None
+    assert first["delta_speed_frac"] != second["delta_speed_frac"]
 
 
 def test_words_that_are_no_decider_are_named() -> None:
@@ -95,3 +129,28 @@ def test_words_that_are_no_decider_are_named() -> None:
         drive(decider("fast")[0], ["table2-sparse-15"], [1], episode_s=5.0)
     with pytest.raises(FileNotFoundError, match="nothing"):
         decider("dqn:nothing.safetensors")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--deciders", "fast"], "fast"),
+        (["--weights", "nothing.safetensors", "--deciders", "dqn"], "nothing"),
+        (["--seeds", "0"], "--seeds 0"),
+        (["--fidelity", "paper", "--deciders", "mobil"], "fidelity"),
+        (
+            ["--scenarios", "flat", "--spawn-interval-s", "0.2"],
+            "flat: no traffic.family",
+        ),
+    ],
+)
+def test_wrong_words_are_one_line_and_exit_code_2(
+    words: list[str],
+    named: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    given = ["--scenarios", "table2-sparse-15", "--duration-s", "5", "--seeds", "1"]
+    with pytest.raises(SystemExit) as refused:
+        main([*given, "--out", str(tmp_path), *words])
+    assert refused.value.code == 2 and named in capsys.readouterr().err

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,23 +12,25 @@ import numpy.typing as npt
 from tractrix import _native
 
 _ACTIONS = ("left", "keep", "right")
+SHIPPED = "builtin:table2"
+"""The policy that is shipped."""
 
 
 class Policy:
     """Weights that a training has exported, and the forward pass of the truck's own decider.
 
     Args:
-        file: `.safetensors` file with its `.json` beside it (`tractrix.train.export`).
+        file: `.safetensors` file with its `.json` beside it (`tractrix.train.export`). Default: the
+            policy that is shipped, which `--decider dqn` drives.
 
     Raises:
         ValueError: Weights or sidecar that cannot be used; the text says why.
         FileNotFoundError: A file that is not there.
     """
 
-    def __init__(self, file: str | os.PathLike[str]) -> None:
+    def __init__(self, file: str | os.PathLike[str] = SHIPPED) -> None:
         self._native = _native.Policy(os.fspath(file))
-        text = Path(file).with_suffix(".json").read_text()
-        self.sidecar: dict[str, Any] = json.loads(text)
+        self.sidecar: dict[str, Any] = json.loads(self._native.sidecar())
         """What is known of the training."""
         self.spec: str = self._native.spec()
         """`spec` of the `tractrix.VectorEnv` whose observations it wants."""

@@ -9,6 +9,8 @@ const HARD_M_S2: f64 = 3.0;
 const EGO_BRAKES_M_S2: f64 = 1.0;
 /// Time after the ego's entry into a lane for which braking behind it is its doing, s.
 const ENTERED_S: f64 = 5.0;
+/// Room for those who brake one after the other: more are not in one braking.
+const ROOM: usize = 16;
 
 /// A vehicle behind the truck in its lane brakes harder than 3 m/s² within twice its safe gap while
 /// the truck brakes harder than 1 m/s², or has entered its lane within the last 5 s; once per vehicle
@@ -20,6 +22,13 @@ pub(crate) struct Behind {
 }
 
 impl Behind {
+    /// Forgets everybody.
+    pub(crate) fn clear(&mut self) {
+        self.entered = None;
+        self.braking.clear();
+        self.braking.reserve(ROOM);
+    }
+
     /// Whether somebody begins to now.
     pub(crate) fn begins_to_brake(
         &mut self,

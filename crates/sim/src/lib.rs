@@ -84,4 +84,4 @@ pub use traffic_section::{
     Family, OnFailure, ReplaySection, SumoSection, SumoTimeouts, TrafficKind, TrafficSection,
 };
 pub use truck::Truck;
-pub use world::{Status, World, read_policy, stack_of};
+pub use world::{Status, World, policy_files, read_policy, stack_of};

@@ -332,8 +332,17 @@ const BUILTIN_SIDECAR: &str = include_str!("../../../policies/table2.json");
 /// # Errors
 /// [`SimError`] names the file that cannot be read or used.
 pub fn read_policy(file: &Path) -> Result<planner::decider::Policy, SimError> {
+    let (weights, sidecar) = policy_files(file)?;
+    Ok(planner::decider::Policy::from_files(&weights, &sidecar)?)
+}
+
+/// The contents of a file of weights (or `builtin:table2`) and of the `.json` beside it.
+///
+/// # Errors
+/// [`SimError::Io`] names the file that cannot be read.
+pub fn policy_files(file: &Path) -> Result<(Vec<u8>, String), SimError> {
     if file == Path::new(BUILTIN_POLICY) {
-        return Ok(planner::decider::Policy::from_files(BUILTIN_WEIGHTS, BUILTIN_SIDECAR)?);
+        return Ok((BUILTIN_WEIGHTS.to_vec(), BUILTIN_SIDECAR.to_owned()));
     }
     let io = |path: &Path| {
         let path = path.to_owned();
@@ -342,5 +351,5 @@ pub fn read_policy(file: &Path) -> Result<planner::decider::Policy, SimError> {
     let sidecar = file.with_extension("json");
     let weights = std::fs::read(file).map_err(io(file))?;
     let text = std::fs::read_to_string(&sidecar).map_err(io(&sidecar))?;
-    Ok(planner::decider::Policy::from_files(&weights, &text)?)
+    Ok((weights, text))
 }

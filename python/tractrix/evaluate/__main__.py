@@ -1,6 +1,6 @@
 """Table II: deciders in the same traffic, seed by seed.
 
-python -m tractrix.evaluate --seeds 20 --out runs/table2 --deciders rules:50 mobil
+python -m tractrix.evaluate --seeds 20 --out runs/table2 --deciders rules:50,mobil,dqn
 """
 
 from __future__ import annotations
@@ -13,69 +13,90 @@ from pathlib import Path
 import numpy as np
 
 from tractrix import __git_revision__, __version__
+from tractrix._policy import SHIPPED
 from tractrix.evaluate import report
 from tractrix.evaluate.deciders import decider
-from tractrix.evaluate.drive import TABLE2, drive
+from tractrix.evaluate.drive import TABLE2, drive, with_spawn_interval
 
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
     parser = argparse.ArgumentParser(
         prog="python -m tractrix.evaluate",
-        description="Drives deciders in the same traffic, seed by seed.",
+        description=f"Drives deciders in the same traffic, seed by seed. {report.REFERENCE} is the "
+        "reference: it is always driven.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     parser.add_argument("--out", type=Path, required=True, help="folder of its files")
     parser.add_argument(
         "--deciders",
         nargs="+",
-        default=["rules:50", "rules:100", "rules:150", "mobil"],
-        help="keep, rules:METRES, mobil, rollout, dqn:FILE, imagined[:BASE], ceiling[:BASE]; "
-        "the first is the reference",
+        default=["rules:50", "rules:100", "rules:150", "mobil", "rollout", "dqn"],
+        help="keep, rules:METRES, mobil, rollout, dqn (the weights), dqn:FILE, imagined[:BASE], "
+        "ceiling[:BASE]; with spaces or commas between",
     )
+    parser.add_argument("--weights", default=SHIPPED, help="weights of the decider dqn")
     parser.add_argument("--scenarios", nargs="+", default=list(TABLE2), help=" ")
     parser.add_argument("--seeds", type=int, default=200, help="episodes of each")
-    parser.add_argument("--first-seed", type=int, default=2_000_000, help=" ")
-    parser.add_argument("--episode-s", type=float, default=600.0, help=" ")
+    parser.add_argument("--first-seed", type=int, default=0, help=" ")
+    parser.add_argument("--duration-s", type=float, default=600.0, help="of an episode")
+    parser.add_argument(
+        "--spawn-interval-s",
+        type=float,
+        help="the less, the denser the traffic: 0.4 in table2-*, 0.1 in the paper "
+        "(default: as the scenario says)",
+    )
     parser.add_argument("--fidelity", default="kinematic", help="kinematic or truck")
     parser.add_argument("--threads", type=int, default=1, help=" ")
     given = parser.parse_args(arguments)
-    known = {word: decider(word) for word in given.deciders}
-    seeds = range(given.first_seed, given.first_seed + given.seeds)
-    results: dict[str, dict[str, report.Figures]] = {s: {} for s in given.scenarios}
-    cpu_s: dict[str, float] = {}
-    for word, (decide, spec) in known.items():
-        before_s = time.process_time()
-        for scenario in given.scenarios:
-            figures = drive(
-                decide,
-                [scenario],
-                seeds,
-                spec=spec,
-                episode_s=given.episode_s,
-                fidelity=given.fidelity,
-                threads=given.threads,
-            )
-            found = {name: values[0] for name, values in figures.items()}
-            results[scenario][word] = found
-            delta = 100 * np.mean(found["delta_speed_frac"])
-            print(f"{scenario} {word}: {delta:.2f} %", file=sys.stderr)
-        cpu_s[word] = time.process_time() - before_s
+    words = [word for text in given.deciders for word in text.split(",") if word]
+    words = list(dict.fromkeys([report.REFERENCE, *words]))
+    try:
+        known = {word: decider(word, given.weights) for word in words}
+        if given.seeds < 1:
+            parser.error(f"--seeds {given.seeds}: at least 1")
+        seeds = range(given.first_seed, given.first_seed + given.seeds)
+        scenarios = {
+            name: with_spawn_interval(name, given.spawn_interval_s)
+            for name in given.scenarios
+        }
+        results: dict[str, dict[str, report.Figures]] = {s: {} for s in scenarios}
+        cpu_s: dict[str, float] = {}
+        for word, (decide, spec) in known.items():
+            before_s = time.process_time()
+            for name, scenario in scenarios.items():
+                figures = drive(
+                    decide,
+                    [scenario],
+                    seeds,
+                    spec=spec,
+                    episode_s=given.duration_s,
+                    fidelity=given.fidelity,
+                    threads=given.threads,
+                )
+                found = {figure: values[0] for figure, values in figures.items()}
+                results[name][word] = found
+                delta = 100 * np.mean(found["delta_speed_frac"])
+                print(f"{name} {word}: {delta:.2f} %", file=sys.stderr)
+            cpu_s[word] = time.process_time() - before_s
+    except (ValueError, OSError) as wrong:
+        parser.error(str(wrong))
     about = {
         "schema": 1,
         "version": __version__,
         "git_revision": __git_revision__,
-        "seeds": [seeds.start, seeds.stop],
-        "episode_s": given.episode_s,
+        "seed": given.first_seed,
+        "duration_s": given.duration_s,
+        "spawn_interval_s": given.spawn_interval_s,
         "fidelity": given.fidelity,
+        "weights": given.weights,
         "cpu_s": cpu_s,
     }
-    reference = given.deciders[0]
-    table = report.summary(results, reference)
-    report.write(results, table, reference, about, given.out)
-    print(report.markdown(table, reference), end="")
+    rows = report.summary(results)
+    report.write(results, rows, about, given.out)
+    print(report.markdown(rows), end="")
     try:
-        report.plot(table, given.out / "front.svg")
+        report.plot(rows, given.out / "front.svg")
     except ImportError:
         print("no plot: Matplotlib is not installed", file=sys.stderr)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tractrix._policy import Policy
+from tractrix._policy import SHIPPED, Policy
 from tractrix._vector_env import VectorEnv
 from tractrix.evaluate.drive import Decide
 
@@ -15,14 +15,15 @@ KEEP = 1
 """The action that keeps the lane."""
 
 
-def decider(word: str) -> tuple[Decide, str]:
+def decider(word: str, weights: str = SHIPPED) -> tuple[Decide, str]:
     """Who decides, and the `spec` of the environments that it wants.
 
     Args:
-        word: `keep`, `rules:METRES`, `mobil` and `rollout` as in the truck; `dqn:FILE`, a learned
-            policy; `imagined[:BASE]`, the change that imagined traffic of average drivers rewards most with
-            `BASE` (`mobil`) deciding after it; `ceiling[:BASE]`, the same with the true drivers,
-            which nobody on the road knows: an upper bound, not a competitor.
+        word: `keep`, `rules:METRES`, `mobil` and `rollout` as in the truck; `dqn` or `dqn:FILE`, a
+            learned policy; `imagined[:BASE]`, the change that imagined traffic of average drivers
+            rewards most with `BASE` (`mobil`) deciding after it; `ceiling[:BASE]`, the same with the
+            true drivers, which nobody on the road knows: an upper bound, not a competitor.
+        weights: The file that `dqn` means.
 
     Raises:
         ValueError: Another word, or a policy that cannot be used.
@@ -30,7 +31,7 @@ def decider(word: str) -> tuple[Decide, str]:
     """
     kind, _, rest = word.partition(":")
     if kind == "dqn":
-        policy = Policy(rest)
+        policy = Policy(rest or weights)
         masked = policy.spec == "ours"
 
         def learned(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tractrix._scenario import scenario
 from tractrix._vector_env import Scenario, VectorEnv
 
 Decide = Callable[
@@ -20,6 +21,24 @@ TABLE2 = tuple(
     for speed in ("12.5", "15")
 )
 """The scenarios of the paper's Table II, by density and traffic speed in m/s."""
+
+
+def with_spawn_interval(name: str, spawn_interval_s: float | None) -> Scenario:
+    """A scenario with another time between two chances of an arrival.
+
+    Raises:
+        ValueError: A scenario whose demand is not that of a family.
+    """
+    if spawn_interval_s is None:
+        return name
+    changed = scenario(name)
+    family = changed["traffic"].get("family")
+    if not family:
+        raise ValueError(
+            f"{name}: no traffic.family whose spawn_interval_s could be set"
+        )
+    family["spawn_interval_s"] = spawn_interval_s
+    return changed
 
 
 def drive(

@@ -12,6 +12,7 @@ use tractrix_core::{Geometry, LaneChangeRefusal, Maneuver, Recorder, Tick, Vehic
 use traffic_client::Mode;
 use traffic_client::native::{NativeSnapshot, NativeTraffic};
 
+use super::contacts::Contacts;
 use super::kinematic::Kinematic;
 use super::reward::RewardConfig;
 use super::{ACTIONS, EnvSpec, EpisodeStats, Fidelity, SUBSTEP_S, Substep, mix};
@@ -49,6 +50,7 @@ pub(super) struct State {
     pub(super) stats: EpisodeStats,
     maneuver: Maneuver,
     behind: Behind,
+    contacts: Contacts,
     start_s_m: f64,
     /// Where the seeds of the episodes are from, and how many have ended since.
     stream: u64,
@@ -77,15 +79,18 @@ impl Clone for State {
             body: self.body.clone(),
             observer: self.observer.clone(),
             behind: self.behind.clone(),
+            contacts: self.contacts.clone(),
             ..*self
         }
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { body, observer, behind, stats, maneuver, start_s_m, stream, episode } = from;
+        let Self { body, observer, behind, contacts, .. } = from;
+        let Self { stats, maneuver, start_s_m, stream, episode, .. } = from;
         self.body.clone_from(body);
         self.observer.clone_from(observer);
         self.behind.clone_from(behind);
+        self.contacts.clone_from(contacts);
         (self.stats, self.maneuver, self.start_s_m) = (*stats, *maneuver, *start_s_m);
         (self.stream, self.episode) = (*stream, *episode);
     }
@@ -240,16 +245,29 @@ impl Env {
             (None, None) => (mix(batch_seed, self.index, 0), 0),
         };
         let seed = if episode == 0 { stream } else { mix(stream, 1, episode) };
-        let former = self.state.take().map(|state| (state.body, state.observer));
-        let (body, observer) = former.map_or((None, None), |(b, o)| (Some(b), Some(o)));
+        let former = self.state.take();
+        let (body, observer, mut behind, mut contacts) = match former {
+            Some(state) => (Some(state.body), Some(state.observer), state.behind, state.contacts),
+            None => (None, None, Behind::default(), Contacts::default()),
+        };
         let (body, start_s_m) = self.shared.body(seed, body)?;
         let mut observer = observer.unwrap_or_else(|| Observer::new(self.shared.spec.decision_s));
         observer.clear();
         let stats = EpisodeStats { seed, ..EpisodeStats::default() };
         let maneuver = Maneuver::KeepLane;
-        let behind = Behind::default();
-        self.state =
-            Some(State { body, observer, stats, maneuver, behind, start_s_m, stream, episode });
+        behind.clear();
+        contacts.clear();
+        self.state = Some(State {
+            body,
+            observer,
+            behind,
+            contacts,
+            stats,
+            maneuver,
+            start_s_m,
+            stream,
+            episode,
+        });
         Ok(())
     }
 
@@ -260,7 +278,7 @@ impl Env {
         let wish = ACTIONS[usize::from(action)];
         let state = self.state.as_mut().ok_or_else(not_begun)?;
         let (mut reward_s, mut begun, mut refused) = (0.0, 0, false);
-        let (mut collided, mut over) = (false, false);
+        let (mut contact, mut over) = (None, false);
         for k in 0..shared.substeps {
             let wished = if k == 0 { wish } else { LaneChoice::Keep };
             let step = state.substep(wished, &shared)?;
@@ -279,20 +297,22 @@ impl Env {
                 state.stats.delta = (sum + lacks, number + 1);
             }
             state.stats.time_s += SUBSTEP_S;
-            collided |= step.collided;
+            contact = step.contact;
             over = state.is_at_end(&shared);
-            if collided || over {
+            if contact.is_some() || over {
                 break;
             }
         }
+        let collided = contact.is_some();
         reward_s -= spec.reward.cost(wish != LaneChoice::Keep, begun, refused, collided);
-        let driven_m = state.s_m() - state.start_s_m;
+        let (driven_m, fuel_g) = (state.s_m() - state.start_s_m, state.fuel_g());
         let stats = &mut state.stats;
         stats.decisions += 1;
         stats.reward_s += reward_s;
         stats.lane_changes += begun;
         stats.refused += u32::from(refused);
-        stats.collided = collided;
+        (stats.collided, stats.collision_caused) = (collided, contact == Some(true));
+        stats.fuel_g = fuel_g;
         over |= stats.time_s + 0.5 * SUBSTEP_S >= spec.episode_s;
         stats.distance_m = driven_m;
         Ok(Ended { reward_s, terminated: collided, truncated: over && !collided })
@@ -361,7 +381,7 @@ impl State {
     /// Drives [`SUBSTEP_S`].
     fn substep(&mut self, wish: LaneChoice, shared: &Shared) -> Result<Substep, SimError> {
         let rss = &shared.spec.scenario.stack.rss;
-        let Self { body, behind, stats, .. } = self;
+        let Self { body, behind, contacts, stats, .. } = self;
         let world = match body {
             Body::Kinematic(kinematic) => {
                 let step = kinematic.step(wish)?;
@@ -369,13 +389,14 @@ impl State {
                 let geometry = &limits.geometry;
                 let brakes = behind.begins_to_brake(now, ego, scene, step.maneuver, geometry, rss);
                 stats.hard_braking_caused += u32::from(brakes);
-                return Ok(step);
+                let contact = contacts.watch(ego, scene, step.maneuver, geometry);
+                return Ok(Substep { contact, ..step });
             }
             Body::Truck(world) => world,
         };
         world.stack_mut().request_lane_change(wish);
         let geometry = &world.truck().limits().geometry.clone();
-        let mut seen = Seen { last: None, behind, brake: 0, geometry, rss };
+        let mut seen = Seen { last: None, behind, contacts, brake: 0, geometry, rss };
         let mut first: Option<Substep> = None;
         for _ in 0..shared.ticks {
             world.tick(&mut seen)?;
@@ -386,7 +407,16 @@ impl State {
             (Some(first), Some(last)) => (first, last),
             _ => return Err(not_begun()),
         };
-        Ok(Substep { refused: first.refused, collided: world.collisions() > 0, ..last })
+        // Bodies that touch on the map but not yet in road coordinates count against the truck.
+        let contact = (world.collisions() > 0).then(|| last.contact.unwrap_or(true));
+        Ok(Substep { refused: first.refused, contact, ..last })
+    }
+
+    fn fuel_g(&self) -> Option<f64> {
+        match &self.body {
+            Body::Kinematic(_) => None,
+            Body::Truck(world) => Some(world.truck().state().powertrain.fuel_used_g),
+        }
     }
 
     fn s_m(&self) -> f64 {
@@ -412,6 +442,7 @@ impl State {
 struct Seen<'a> {
     last: Option<Substep>,
     behind: &'a mut Behind,
+    contacts: &'a mut Contacts,
     brake: u32,
     geometry: &'a Geometry,
     rss: &'a RssConfig,
@@ -424,12 +455,13 @@ impl Recorder for Seen<'_> {
         let Self { behind, geometry, rss, .. } = self;
         let brakes = behind.begins_to_brake(now, ego, scene, plan.maneuver, geometry, rss);
         self.brake += u32::from(brakes);
+        let contact = self.contacts.watch(ego, scene, plan.maneuver, geometry);
         self.last = Some(Substep {
             speed_m_s: tick.ego.speed_m_s,
             reference_m_s: tick.plan.reference_speed_m_s,
             maneuver: tick.plan.maneuver,
             refused,
-            collided: false,
+            contact: contact.or(self.last.and_then(|last| last.contact)),
         });
     }
 }

@@ -9,9 +9,7 @@ use std::sync::Arc;
 use planner::decider::LaneChoice;
 use planner::{Situation, Tactics};
 use road::Road;
-use tractrix_core::{
-    EgoState, Geometry, Neighbour, RoadPiece, Scene, Time, TrafficSource, VehicleLimits,
-};
+use tractrix_core::{EgoState, Geometry, RoadPiece, Scene, Time, TrafficSource, VehicleLimits};
 use traffic_client::native::NativeTraffic;
 
 use super::{SUBSTEP_S, Substep};
@@ -88,7 +86,7 @@ impl Kinematic {
             reference_m_s: plan.reference_speed_m_s,
             maneuver: plan.maneuver,
             refused: plan.refusal,
-            collided: false,
+            contact: None,
         };
         let accel_m_s2 = plan
             .target_accel_m_s2
@@ -109,9 +107,7 @@ impl Kinematic {
         follow_hitch(e, &self.limits.geometry);
         self.now = self.now.plus_nanos(SUBSTEP_NS);
         self.traffic.advance(self.now, &self.ego)?;
-        let touches = |n: &Neighbour| touch(&self.ego, &self.limits.geometry, n);
-        let collided = self.traffic.scene().neighbours.iter().any(touches);
-        Ok(Substep { collided, ..substep })
+        Ok(substep)
     }
 
     /// The acceleration that full power gives on this grade, m/s².
@@ -149,11 +145,4 @@ fn follow_hitch(ego: &mut EgoState, geometry: &Geometry) {
     let turned = geometry.hitch_ahead_m * ego.yaw_rate_rad_s * cos - ego.speed_m_s * sin;
     ego.trailer.yaw_rate_rad_s = turned / geometry.hitch_to_trailer_axle_m.max(1.0);
     ego.trailer.articulation_rad += (ego.trailer.yaw_rate_rad_s - ego.yaw_rate_rad_s) * SUBSTEP_S;
-}
-
-/// Whether the ego's length and width, in road coordinates, touch a vehicle.
-fn touch(ego: &EgoState, geometry: &Geometry, n: &Neighbour) -> bool {
-    n.rear_s_m < ego.s_m + geometry.front_m
-        && n.front_s_m > ego.s_m - geometry.rear_m()
-        && (n.d_m - ego.d_m).abs() < 0.5 * (n.width_m + geometry.width_m)
 }

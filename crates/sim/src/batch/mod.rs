@@ -5,6 +5,7 @@
 //! | `mod` | the batch: shapes, threads, episodes that begin again |
 //! | `env` | one environment: decision, observation, mask |
 //! | `kinematic` | the ego as a point on its path ([`Fidelity::Kinematic`]) |
+//! | `contacts` | whom the truck touches, and who is the cause |
 //! | `reward` | what a decision earns |
 //! | `stats` | what an episode came to |
 //! | `advantages` | what a change now is worth over keeping, by rollouts |
@@ -15,6 +16,7 @@
 //! observation is in [`Views::final_obs`].
 
 mod advantages;
+mod contacts;
 mod env;
 mod kinematic;
 mod reward;
@@ -125,7 +127,8 @@ struct Substep {
     reference_m_s: f64,
     maneuver: Maneuver,
     refused: Option<LaneChangeRefusal>,
-    collided: bool,
+    /// Somebody is touched; true: by the truck's doing.
+    contact: Option<bool>,
 }
 
 /// An environment with its rows.

@@ -27,6 +27,11 @@ pub struct EpisodeStats {
     pub hard_braking_caused: u32,
     /// The episode ended by touching another vehicle.
     pub collided: bool,
+    /// And the truck was the cause: it ran into somebody who had not just cut in, or changed lanes
+    /// into somebody who kept theirs.
+    pub collision_caused: bool,
+    /// Fuel used, g; none for a kinematic ego, which has no engine.
+    pub fuel_g: Option<f64>,
 }
 
 impl EpisodeStats {
