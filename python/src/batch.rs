@@ -7,6 +7,7 @@ use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
 use sim::batch::{BasePolicy, Drivers, EnvSpec, EpisodeStats, Fidelity, RolloutSpec, Views};
 use sim::{Overrides, SimError};
+use traffic_client::native::WindowConfig;
 
 use crate::fault::Fault;
 use crate::scenario::changed;
@@ -97,7 +98,8 @@ impl Batch {
 impl Batch {
     /// `count` environments, the scenarios (name, or JSON text) in turn.
     #[new]
-    #[pyo3(signature = (count, scenarios, *, road, seed, fidelity, spec, episode_s, start_spread_m, threads))]
+    #[pyo3(signature = (count, scenarios, *, road, seed, fidelity, spec, episode_s, start_spread_m, window_m,
+        threads))]
     #[expect(clippy::too_many_arguments, reason = "keywords of one call from Python")]
     fn new(
         py: Python<'_>,
@@ -109,6 +111,7 @@ impl Batch {
         spec: &str,
         episode_s: f64,
         start_spread_m: f64,
+        window_m: Option<(f64, f64)>,
         threads: usize,
     ) -> PyResult<Self> {
         let fidelity = match fidelity {
@@ -130,7 +133,12 @@ impl Batch {
             let changes = Overrides { road, ..Overrides::default() };
             let specs = scenarios.iter().map(|(name, json)| {
                 let scenario = changed(name, json.as_deref(), &changes)?;
-                Ok(EnvSpec { episode_s, start_spread_m, ..of(scenario, fidelity) })
+                let usual = of(scenario, fidelity);
+                let window = window_m.map_or(usual.window, |(behind_m, ahead_m)| {
+                    let whole = behind_m == f64::INFINITY && ahead_m == f64::INFINITY;
+                    (!whole).then_some(WindowConfig { behind_m, ahead_m })
+                });
+                Ok(EnvSpec { episode_s, start_spread_m, window, ..usual })
             });
             let specs = specs.collect::<Result<Vec<_>, Fault>>()?;
             let specs: Vec<EnvSpec> = specs.iter().cycle().take(count).cloned().collect();

@@ -57,6 +57,22 @@ def test_the_same_seeds_give_the_same_numbers_on_any_number_of_threads() -> None
     assert drive(1) == drive(2) == drive(3)
 
 
+def test_the_window_can_be_set_and_done_without() -> None:
+    def drive(**arguments: Any) -> list[bytes]:
+        env = envs(scenario="table2-dense-12.5", episode_s=300.0, **arguments)
+        env.reset(seed=3)
+        return [env.step(keep())[0].tobytes() for _ in range(150)]
+
+    usual, whole = drive(), drive(window_m=(np.inf, np.inf))
+    assert usual == drive(window_m=(300.0, 400.0))
+    # what comes from beyond the window arrives later
+    assert usual[:10] == whole[:10] and usual != whole
+    with pytest.raises(ValueError, match=r"window\.behind_m.*1"):
+        envs(window_m=(1.0, 400.0))
+    with pytest.raises(ValueError, match=r"window\.ahead_m"):
+        envs(window_m=(300.0, float("nan")))
+
+
 def test_reset_mask_leaves_the_others_alone() -> None:
     env = envs()
     env.reset(seed=1)

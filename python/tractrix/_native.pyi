@@ -99,6 +99,7 @@ class Batch:
         spec: str,
         episode_s: float,
         start_spread_m: float,
+        window_m: tuple[float, float] | None,
         threads: int,
     ) -> Self: ...
     def observation_size(self) -> int: ...

@@ -50,6 +50,9 @@ class VectorEnv(
         road: Another road than the scenario's.
         episode_s: Length of an episode, s.
         start_spread_m: The truck starts up to so far beyond the scenario's start, m.
+        window_m: Behind and ahead of the truck, m, within which vehicles act in every tick, those
+            beyond every 0.5 s; infinity twice: all do always. Default: 300 and 400 where the truck is
+            kinematic, else all.
         copy: Whether `reset` and `step` return copies of the observations, masks and rewards, or the
             arrays that the next call writes again.
 
@@ -75,6 +78,7 @@ class VectorEnv(
         road: str | os.PathLike[str] | None = None,
         episode_s: float = 600.0,
         start_spread_m: float = 1000.0,
+        window_m: tuple[float, float] | None = None,
         copy: bool = True,
     ) -> None:
         several = isinstance(scenario, Sequence) and not isinstance(scenario, str)
@@ -91,6 +95,7 @@ class VectorEnv(
             spec=spec,
             episode_s=float(episode_s),
             start_spread_m=float(start_spread_m),
+            window_m=window_m,
             threads=whole("threads", threads),
         )
         size = self._native.observation_size()

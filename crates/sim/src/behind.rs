@@ -15,10 +15,30 @@ const ROOM: usize = 16;
 /// A vehicle behind the truck in its lane brakes harder than 3 m/s² within twice its safe gap while
 /// the truck brakes harder than 1 m/s², or has entered its lane within the last 5 s; once per vehicle
 /// and braking.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug)]
 pub(crate) struct Behind {
     entered: Option<Time>,
     braking: Vec<u64>,
+}
+
+impl Default for Behind {
+    fn default() -> Self {
+        Self { entered: None, braking: Vec::with_capacity(ROOM) }
+    }
+}
+
+/// A copy has the room too; `clone_from` copies into it.
+impl Clone for Behind {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.entered = from.entered;
+        self.braking.clone_from(&from.braking);
+    }
 }
 
 impl Behind {
@@ -26,7 +46,6 @@ impl Behind {
     pub(crate) fn clear(&mut self) {
         self.entered = None;
         self.braking.clear();
-        self.braking.reserve(ROOM);
     }
 
     /// Whether somebody begins to now.

@@ -1,55 +1,15 @@
 //! Environments in batches: the same bits as a world, on any number of threads, and what the mask
 //! says is what the gate does.
 
-use sim::batch::{Batch, EnvSnapshot, EnvSpec, EpisodeStats, Fidelity, Views};
+#[path = "support/arrays.rs"]
+mod arrays;
+
+use arrays::{Arrays, allowed};
+use sim::batch::{Batch, EnvSnapshot, EnvSpec, Fidelity};
 use sim::{Scenario, SimError, Status, World};
-
-/// Arrays of a batch.
-struct Arrays {
-    obs: Vec<f32>,
-    mask: Vec<u8>,
-    reward: Vec<f32>,
-    terminated: Vec<u8>,
-    truncated: Vec<u8>,
-    final_obs: Vec<f32>,
-    episodes: Vec<EpisodeStats>,
-}
-
-impl Arrays {
-    fn of(batch: &Batch) -> Self {
-        let (n, size) = (batch.len(), batch.observation_size());
-        Self {
-            obs: vec![0.0; n * size],
-            mask: vec![0; 3 * n],
-            reward: vec![0.0; n],
-            terminated: vec![0; n],
-            truncated: vec![0; n],
-            final_obs: vec![0.0; n * size],
-            episodes: vec![EpisodeStats::default(); n],
-        }
-    }
-
-    fn views(&mut self) -> Views<'_> {
-        Views {
-            obs: &mut self.obs,
-            mask: &mut self.mask,
-            reward: &mut self.reward,
-            terminated: &mut self.terminated,
-            truncated: &mut self.truncated,
-            final_obs: &mut self.final_obs,
-            episodes: &mut self.episodes,
-        }
-    }
-}
 
 fn spec(name: &str, fidelity: Fidelity) -> EnvSpec {
     EnvSpec { start_spread_m: 500.0, ..EnvSpec::new(Scenario::builtin(name).unwrap(), fidelity) }
-}
-
-/// An action among those that the mask allows, by a number.
-fn allowed(mask: &[u8], number: usize) -> u8 {
-    let open: Vec<u8> = (0..3).filter(|&a| mask[usize::from(a)] == 1).collect();
-    open[number % open.len()]
 }
 
 #[test]

@@ -13,9 +13,28 @@ const MOST: usize = 64;
 
 /// Those in the truck's way, in road coordinates: as wide as the truck, from its rear to
 /// [`SEEN_M`] ahead of its front.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug)]
 pub(super) struct Contacts {
     beside: Vec<Beside>,
+}
+
+impl Default for Contacts {
+    fn default() -> Self {
+        Self { beside: Vec::with_capacity(MOST) }
+    }
+}
+
+/// A copy has the room too; `clone_from` copies into it.
+impl Clone for Contacts {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    fn clone_from(&mut self, from: &Self) {
+        self.beside.clone_from(&from.beside);
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -30,7 +49,6 @@ impl Contacts {
     /// Forgets everybody.
     pub(super) fn clear(&mut self) {
         self.beside.clear();
-        self.beside.reserve(MOST);
     }
 
     /// Looks at the present scene: whether the truck touches somebody, and if so whether it is the
@@ -100,7 +118,6 @@ mod tests {
 
     fn watch(scenes: &[Scene], maneuver: Maneuver) -> Option<bool> {
         let mut contacts = Contacts::default();
-        contacts.clear();
         let ego = EgoState { s_m: 100.0, ..EgoState::default() };
         // from 88 m to 105 m
         let (front_m, trailer_rear_m) = (5.0, 12.0);

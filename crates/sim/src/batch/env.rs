@@ -225,6 +225,7 @@ impl Shared {
             kinematic.traffic.restore(start);
         }
         kinematic.traffic.reseed(seed);
+        kinematic.traffic.make_room();
         let ego = *self.truck(further_m)?.state();
         kinematic.begin(ego)?;
         Ok((Body::Kinematic(kinematic), ego.s_m))

@@ -66,7 +66,7 @@ pub(crate) struct State {
 
 impl Clone for State {
     fn clone(&self) -> Self {
-        let mut copy = Self::default();
+        let mut copy = Self { fleet: self.fleet.clone(), ..Self::default() };
         copy.clone_from(self);
         copy
     }
@@ -127,6 +127,7 @@ pub(crate) struct Engine {
 impl Clone for Engine {
     fn clone(&self) -> Self {
         let mut copy = Self::new(Arc::clone(&self.config), Arc::clone(&self.map));
+        copy.state = self.state.clone();
         copy.clone_from(self);
         copy
     }

@@ -37,7 +37,8 @@ impl Clone for Fleet {
     fn clone(&self) -> Self {
         let mut copy = Self::default();
         copy.clone_from(self);
-        copy.make_room(self.len() / 4 + 16);
+        let room = self.s_m.capacity() - self.len();
+        copy.make_room(room.max(self.len() / 4 + 16));
         copy
     }
 

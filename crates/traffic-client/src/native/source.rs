@@ -13,6 +13,8 @@ use super::publish::publish;
 use super::workers::Workers;
 use crate::TrafficError;
 
+/// No vehicle with its gap is shorter, m.
+const SHORTEST_M: f64 = 5.0;
 /// Length of a tick, ns.
 const TICK_NS: i64 = 100_000_000;
 
@@ -31,12 +33,10 @@ pub struct NativeTraffic {
 
 impl Clone for NativeTraffic {
     fn clone(&self) -> Self {
-        Self {
-            engine: self.engine.clone(),
-            road: Arc::clone(&self.road),
-            scene: self.scene.clone(),
-            ..*self
-        }
+        let mut scene = self.scene.clone();
+        let kept = &self.scene.neighbours;
+        scene.neighbours.reserve(kept.capacity() - kept.len());
+        Self { engine: self.engine.clone(), road: Arc::clone(&self.road), scene, ..*self }
     }
 
     fn clone_from(&mut self, from: &Self) {
@@ -185,6 +185,16 @@ impl NativeTraffic {
     /// judge from now on. Vehicles stay as they are.
     pub fn reseed(&mut self, seed: u64) {
         self.engine.reseed(seed);
+    }
+
+    /// Asks for memory now, so that later ticks need none while the number of vehicles stays within
+    /// half as many more, and 32.
+    pub fn make_room(&mut self) {
+        let fleet = &mut self.engine.state.fleet;
+        fleet.make_room(fleet.len() / 2 + 32);
+        let (lanes, radius_m) = (self.engine.map.lanes.len(), self.engine.config.scene_radius_m);
+        let most = lanes * (2.0 * radius_m / SHORTEST_M) as usize;
+        self.scene.neighbours.reserve(most.min(fleet.len() + fleet.len() / 2 + 32));
     }
 
     /// Takes away every vehicle that is not within this stretch of the road, m: less to move where

@@ -115,7 +115,8 @@ impl Observer {
     #[must_use]
     pub fn new(period_s: f64) -> Self {
         let per_second = libm::round(1.0 / period_s.clamp(1e-3, 1.0)) as usize;
-        Self { frames: VecDeque::with_capacity(3 * per_second + 1), per_second }
+        // one more while the newest is in and the oldest not yet out
+        Self { frames: VecDeque::with_capacity((FRAMES - 1) * per_second + 2), per_second }
     }
 
     /// Takes the frame of this instant.
