@@ -71,13 +71,14 @@ impl ReferenceSpeed {
         let first_m = s_m - behind as f64 * STEP_M;
         let cap = |k: usize| {
             let (at_m, curvature_1_m) = road.line().curvature_1_m(first_m + k as f64 * STEP_M);
-            let curve = libm::sqrt(bounds.curve_accel_m_s2 / curvature_1_m.abs().max(1e-6));
+            let curve_2 = bounds.curve_accel_m_s2 / curvature_1_m.abs().max(1e-6);
             let limit = if bounds.obey_speed_limits {
                 road.lane_speed_limit_m_s(lane, at_m)
             } else {
                 f64::INFINITY
             };
-            curve.min(limit)
+            // the root is taken only where the curve is what bounds
+            if curve_2 >= limit * limit { limit } else { libm::sqrt(curve_2) }
         };
         let mut caps_m_s = [f64::INFINITY; POINTS + LONGEST];
         for (k, cap_m_s) in caps_m_s.iter_mut().enumerate().take(POINTS + behind) {
@@ -112,8 +113,13 @@ impl ReferenceSpeed {
         }));
         for i in (0..POINTS - 1).rev() {
             let ahead = self.points[i + 1].speed_m_s;
-            let reachable = libm::sqrt(ahead * ahead + 2.0 * APPROACH_DECEL_M_S2 * STEP_M);
-            let here = self.points[i].speed_m_s.min(reachable);
+            let allowed = self.points[i].speed_m_s;
+            // more than ahead is always reachable: no root where the speed does not fall
+            let here = if allowed <= ahead {
+                allowed
+            } else {
+                allowed.min(libm::sqrt(ahead * ahead + 2.0 * APPROACH_DECEL_M_S2 * STEP_M))
+            };
             self.points[i].speed_m_s = here;
             self.points[i].accel_m_s2 = (ahead * ahead - here * here) / (2.0 * STEP_M);
         }
