@@ -8,10 +8,12 @@
 
 use core::ops::Range;
 
+use dynamics::effects::fuel::CO2_PER_FUEL;
+
 use crate::balance::{Body, EnergyWindow};
 
-/// CO2 over burnt diesel by mass: carbon fraction 0.865 +- 0.005 times 44.01/12.011.
-pub const CO2_PER_FUEL: (f64, f64) = (3.169, 0.018);
+/// What is known of [`CO2_PER_FUEL`]: a carbon fraction of 0.865 +- 0.005.
+pub const CO2_PER_FUEL_SIGMA: f64 = 0.018;
 /// Length of a window of the ratio, s: longer than the transport in the exhaust sampling.
 const WINDOW_S: f64 = 15.0;
 /// Shortest climb, s, and its least gain of altitude, m.
@@ -205,7 +207,7 @@ impl FuelRecord {
             climb_m,
             wheel_energy_j: window.wheel_energy_j(body, 0.0),
             fuel_g: total(&self.fuel_g_s),
-            carbon_fuel_g: total(&self.co2_g_s) / CO2_PER_FUEL.0,
+            carbon_fuel_g: total(&self.co2_g_s) / CO2_PER_FUEL,
         })
     }
 
@@ -303,7 +305,7 @@ mod tests {
             r.engine_rpm.push(1400.0);
             r.altitude_m.push(altitude);
             r.fuel_g_s.push(fuel * (1.0 + high * fuel / 15.0));
-            r.co2_g_s.push(fuel * CO2_PER_FUEL.0);
+            r.co2_g_s.push(fuel * CO2_PER_FUEL);
             r.segment.push(0.0);
         }
         r
@@ -327,7 +329,7 @@ mod tests {
     #[test]
     fn instruments_that_agree_show_the_ratio_of_chemistry_at_every_load() {
         for bin in record(&body(), 0.0).ratio_by_load(&[0.0, 0.1, 0.5, 1.2]) {
-            assert!((bin.ratio - CO2_PER_FUEL.0).abs() < 1e-9, "{bin:?}");
+            assert!((bin.ratio - CO2_PER_FUEL).abs() < 1e-9, "{bin:?}");
         }
     }
 

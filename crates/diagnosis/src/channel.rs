@@ -30,10 +30,11 @@ pub enum Channel {
     BaroPressurePa,
     GradeFrac,
     Curvature1M,
+    Co2RateGS,
 }
 
 /// Number of channels.
-pub(crate) const CHANNELS: usize = 24;
+pub(crate) const CHANNELS: usize = 25;
 
 struct Spec(Channel, &'static str, f64, f64);
 
@@ -66,12 +67,18 @@ const SPECS: [Spec; CHANNELS] = [
     Spec(C::BaroPressurePa, "baro_pressure_pa", 40_000.0, 110_000.0),
     Spec(C::GradeFrac, "grade_frac", -0.25, 0.25),
     Spec(C::Curvature1M, "curvature_1_m", -0.5, 0.5),
+    Spec(C::Co2RateGS, "co2_rate_g_s", -1.0, 250.0),
 ];
 
 impl Channel {
     /// All channels in table order.
     pub fn all() -> impl Iterator<Item = Self> {
         SPECS.iter().map(|s| s.0)
+    }
+
+    /// Channels that a truck's own logger has: all but those of a laboratory on board.
+    pub fn on_board() -> impl Iterator<Item = Self> {
+        Self::all().filter(|c| *c != C::Co2RateGS)
     }
 
     /// Column name, with its unit.

@@ -88,6 +88,8 @@ pub(crate) fn signals(p: P) -> &'static [&'static str] {
         P::FreePlay | P::SteerLag | P::PayloadX => &["speed_m_s"],
         P::CFront | P::CDrive | P::CTrailer => &["speed_m_s", "accel_y_m_s2"],
         P::Bank => &["curvature_1_m"],
+        P::FuelFlow => &["engine_speed_rpm", "time_s"],
+        P::Co2Scale => &["time_s"],
         _ => &[],
     }
 }

@@ -74,7 +74,7 @@ pub(crate) fn drive_error_by(
     {
         if *ok {
             let measured = d.fuel[4 * k..4 * k + 4].iter().sum::<f64>() * 0.25;
-            e.fuel[0] -= x * d.fuel_noise_g_s[k];
+            e.fuel[0] -= x * d.row_unit(Module::Fuel, k);
             e.fuel[1] += measured;
         }
     }

@@ -30,6 +30,9 @@ pub(crate) type Start = [f64; 2];
 const BOUND: f64 = 1e-3;
 
 const ONE: &[Start] = &[[0.0; 2]];
+/// A meter of a rate may be off by a factor, or more the higher the rate.
+const RATES: &[Start] = &[[0.0, 0.0], [1.0, 0.0]];
+const METERS: &[C] = &[C::FuelRateGS, C::Co2RateGS];
 
 const fn h(
     id: &'static str,
@@ -316,6 +319,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         1.0,
         0.0,
     ),
+    h("fuel_flow_scale", &[P::FuelFlow], &[P::FuelFlowPower], RATES, METERS, 0.02, 0.0),
+    h("co2_scale", &[P::Co2Scale], &[P::Co2Power], RATES, METERS, 0.03, 0.0),
 ];
 
 impl Hypothesis {

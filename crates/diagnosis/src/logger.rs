@@ -12,6 +12,9 @@ use tractrix_core::{BrakeMode, Command, EgoState, GRAVITY_M_S2, RPM_PER_RAD_S, Z
 use crate::Channel;
 use crate::channel::CHANNELS;
 
+/// Number of columns of a truck's own logger.
+pub const ON_BOARD: usize = CHANNELS - 1;
+
 /// Seeded random numbers.
 #[derive(Debug, Clone)]
 pub struct Draw(ChaCha8Rng);
@@ -54,10 +57,10 @@ pub struct Sample<'a> {
 }
 
 impl Sample<'_> {
-    /// A row of the drive table in the order of [`Channel::all`], through the truck's own
+    /// A row of the drive table in the order of [`Channel::on_board`], through the truck's own
     /// instruments, without noise.
     #[must_use]
-    pub fn row(&self) -> [f64; CHANNELS] {
+    pub fn row(&self) -> [f64; ON_BOARD] {
         let (truth, c, patch) = (self.ego, self.command, self.patch);
         let e = self.model.measured(truth);
         let p = &e.powertrain;
@@ -117,6 +120,7 @@ fn sensor(channel: Channel) -> (f64, f64) {
         C::AccelYMS2 => (0.05, 1.0 / 2048.0),
         C::FuelRateGS => (0.0, 0.0116),
         C::CoolantTempDegc => (0.0, 1.0),
+        C::Co2RateGS => (0.2, 0.0),
         C::Gear
         | C::ShiftInProcess
         | C::AmbientTempDegc

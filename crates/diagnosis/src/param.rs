@@ -77,10 +77,14 @@ pub(crate) enum P {
     BrakeLoad,
     WindShare,
     CrosswindShare,
+    FuelFlow,
+    FuelFlowPower,
+    Co2Scale,
+    Co2Power,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 68;
+pub(crate) const PARAMS: usize = 72;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -198,21 +202,27 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     // Where the side force acts: its moments go with the share that is not on the tractor.
     s(P::WindShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
     s(P::CrosswindShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
+    // At the engine's highest rate; laboratories are right within a per cent or two.
+    s(P::FuelFlow, "scale", "1", (0.1, -0.5, 1.0, 0.02), 0.0, 0.0),
+    s(P::FuelFlowPower, "rate_exponent", "1", (0.7, -1.0, 3.0, 0.1), 0.0, 0.0),
+    s(P::Co2Scale, "scale", "1", (0.1, -0.5, 1.0, 0.02), 0.01, 0.0),
+    s(P::Co2Power, "rate_exponent", "1", (0.7, -1.0, 3.0, 0.1), 0.0, 0.0),
 ];
 
 impl Spec {
     /// Scatter between drives before a baseline says more. Causes without a tolerance of their own
-    /// get a small one (but not a free play, which cannot be negative): no truck is exactly its file, and a model of another form than the truth
-    /// leaves a remainder that differs from drive to drive. Shapes have none.
+    /// get a small one (but not a free play, which cannot be negative, nor a fuel meter, whose scatter
+    /// is that of the fuel's level): no truck is exactly its file, and a model of another form than the
+    /// truth leaves a remainder that differs from drive to drive. Shapes have none.
     pub(crate) fn scatter(&self) -> f64 {
-        if self.tolerance > 0.0 || self.is_shape() { self.tolerance } else { 0.02 * self.prior }
+        let has_none = self.is_shape() || matches!(self.p, P::FreePlay | P::FuelFlow);
+        if self.tolerance > 0.0 || has_none { self.tolerance } else { 0.02 * self.prior }
     }
 
     fn is_shape(&self) -> bool {
         matches!(
             self.p,
             P::WarmupTau
-                | P::FreePlay
                 | P::FanStart
                 | P::FanWidth
                 | P::AltitudeStart
@@ -228,6 +238,8 @@ impl Spec {
                 | P::SteerDelay
                 | P::WindShare
                 | P::CrosswindShare
+                | P::FuelFlowPower
+                | P::Co2Power
         )
     }
 }

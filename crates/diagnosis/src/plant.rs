@@ -59,7 +59,12 @@ impl Plant {
     pub(crate) fn with_instruments(&self, theta: &Theta) -> Theta {
         let i = &self.truck.instruments;
         let mut t = *theta;
-        for (p, scale) in [(P::SpeedScale, i.speed_scale_coeff), (P::Mass, i.mass_scale_coeff)] {
+        for (p, scale) in [
+            (P::SpeedScale, i.speed_scale_coeff),
+            (P::Mass, i.mass_scale_coeff),
+            (P::FuelFlow, i.fuel_flow_scale_coeff),
+            (P::Co2Scale, i.co2_scale_coeff),
+        ] {
             t[p as usize] = scale * (1.0 + t[p as usize]) - 1.0;
         }
         for (p, offset) in [
@@ -67,6 +72,8 @@ impl Plant {
             (P::GradeBias, i.grade_bias_frac),
             (P::MapShift, i.map_shift_m),
             (P::Bank, i.bank_offset_rad),
+            (P::FuelFlowPower, i.fuel_flow_exponent_coeff),
+            (P::Co2Power, i.co2_exponent_coeff),
         ] {
             t[p as usize] += offset;
         }

@@ -66,6 +66,8 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
         "brake_fade" => format!("Hot brakes lose {percent} % of their force per 100 K."),
         "brake_delay" => format!("The brakes answer {x:.2} s later than modelled."),
         "hidden_retarder" => "A retarder acts that the model does not have.".to_owned(),
+        "fuel_flow_scale" => meter("fuel", x),
+        "co2_scale" => meter("CO2", x),
         "speed_scale" => format!(
             "The wheel speed reads {:.1} % too {}.",
             100.0 * x.abs(),
@@ -93,6 +95,12 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
         "crosswind" => format!("A crosswind of {:.1} m/s blows to the {side}.", x.abs()),
         other => format!("{other}: {x:.3}."),
     }
+}
+
+/// A meter of a rate that is off, at the engine's highest rate.
+fn meter(what: &str, x: f64) -> String {
+    let side = if x >= 0.0 { "high" } else { "low" };
+    format!("At full load the {what} meter reads {:.1} % too {side}.", 100.0 * x.abs())
 }
 
 /// The sentence of a cause with the 90 % interval of its size `x`, which has the unit of its
@@ -133,6 +141,8 @@ pub(crate) fn confusion(a: &str, b: &str, lost_nats: f64) -> String {
         "stops with cold and with hot brakes are needed"
     } else if has(&["altitude_derate", "heat_derate"]) {
         "full load high and cold, and low and hot, is needed"
+    } else if has(&["fuel_flow_scale", "co2_scale", "fuel_map_low_load"]) {
+        "two meters alone do not say which of them is wrong; log the engine's torque beside them, or weigh the fuel of a drive"
     } else if has(&["cornering_stiffness_trailer", "payload_position"]) {
         "drive the same curves empty and loaded"
     } else {
@@ -153,6 +163,7 @@ pub(crate) fn not_excited(id: &str) -> &'static str {
         "payload_position" => "no drive with payload in curves",
         "brake_gain" | "brake_delay" => "too little braking",
         "engine_brake_torque" => "the engine brake hardly acts",
+        "fuel_flow_scale" | "co2_scale" => "too little fuel is burnt",
         _ => "the drives excite it too little",
     }
 }

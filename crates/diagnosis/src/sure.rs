@@ -47,6 +47,7 @@ fn reads(reader: Module, measured: Module) -> bool {
         Module::Force => true,
         Module::Torque => matches!(reader, Module::Force | Module::Fuel),
         Module::Brake => reader == Module::Force,
+        Module::Fuel => reader == Module::Co2,
         Module::Yaw => matches!(reader, Module::Heading | Module::TrailerYaw),
         _ => false,
     }

@@ -70,6 +70,7 @@ const SEARCHED: &[(Module, f64)] = &[
     (Module::Gps, 0.1),
     (Module::Shift, 0.2),
     (Module::Imu, 0.05),
+    (Module::Co2, 3.0),
 ];
 
 /// Rows of a module below which no function is sought.
@@ -78,7 +79,7 @@ const LEAST_ROWS: f64 = 50.0;
 /// Modules whose quantity may be off by a factor that follows one of [`SLOW`], and the prior size
 /// of that factor: an addition that follows a slow signal shows a factor poorly, for it has to be
 /// large where the quantity is large.
-const SCALED: &[Module] = &[Module::Torque, Module::Fuel, Module::Brake, Module::Gps];
+const SCALED: &[Module] = &[Module::Torque, Module::Fuel, Module::Brake, Module::Gps, Module::Co2];
 const FACTOR: f64 = 0.05;
 const SLOW: &[&str] = &["time_s", "ambient_temp_degc", "coolant_temp_degc", "gps_altitude_m"];
 
@@ -102,11 +103,7 @@ fn means_of(x: &[f64], step: usize) -> Vec<f64> {
 /// unit of the `residual`. The measured one would carry the residual's own noise.
 fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
     let measured = means_of(d.measured(module), module.row_step());
-    let scale = |k: usize| match module {
-        Module::Fuel => d.fuel_noise_g_s.get(k).copied().unwrap_or(1.0),
-        _ => 1.0,
-    };
-    let modelled = |(k, (x, r)): (usize, (&f64, &f64))| x / scale(k) - r;
+    let modelled = |(k, (x, r)): (usize, (&f64, &f64))| x / d.row_unit(module, k) - r;
     measured.iter().zip(residual).enumerate().map(modelled).collect()
 }
 

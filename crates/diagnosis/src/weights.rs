@@ -11,7 +11,7 @@
 //! cause's part of the balance and follow a signal. One beside the causes is judged before
 //! ([`crate::sure`]).
 
-/// Probability that a cause of the catalogue is there before any drive is seen: with 35 causes, one
+/// Probability that a cause of the catalogue is there before any drive is seen: with 37 causes, one
 /// truck in six has one.
 pub(crate) const PRIOR_CAUSE: f64 = 0.005;
 

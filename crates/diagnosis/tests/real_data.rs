@@ -20,8 +20,8 @@ mod vt_ucr;
 use std::path::PathBuf;
 
 use diagnosis::FindingKind;
-use diagnosis::carbon::CO2_PER_FUEL;
 use diagnosis::coast_down::place;
+use dynamics::effects::fuel::CO2_PER_FUEL;
 use dynamics::{Overlay, TruckParameters};
 
 type Outcome<T = ()> = Result<T, Box<dyn std::error::Error>>;
@@ -92,7 +92,7 @@ fn fuel_and_carbon_of_a_truck_disagree_with_load() {
     for (bins, consumption) in vt_ucr::study(&dir, None, &truck).unwrap() {
         let (first, last) = (bins.first().unwrap(), bins.last().unwrap());
         assert!(first.ratio - last.ratio > 4.0 * first.sigma.hypot(last.sigma));
-        assert!(last.ratio < CO2_PER_FUEL.0 - 4.0 * last.sigma);
+        assert!(last.ratio < CO2_PER_FUEL - 4.0 * last.sigma);
         let c = consumption.unwrap();
         assert!(c.fuel_g_kwh > 1.15 * c.carbon_g_kwh);
     }

@@ -167,7 +167,7 @@ macro_rules! cause {
 
 /// Every cause that the truck model can carry.
 #[rustfmt::skip]
-pub static CATALOGUE: [Cause; 35] = [
+pub static CATALOGUE: [Cause; 37] = [
     cause!("rolling_resistance", Value,
         "rolling resistance higher than modelled" / "rolling resistance lower than modelled",
         [scale("resistance.rolling_coeff", 0.2, -0.6, 1.5)], []),
@@ -291,6 +291,14 @@ pub static CATALOGUE: [Cause; 35] = [
     cause!("engine_brake_torque", Value,
         "the engine brake holds more than modelled" / "the engine brake holds less than modelled",
         [scale("engine.engine_brake_scale_coeff", 0.2, -0.9, 1.0)], []),
+    cause!("fuel_flow_scale", Instrument,
+        "the fuel meter reads too high" / "the fuel meter reads too low",
+        [scale("instruments.fuel_flow_scale_coeff", 0.1, -0.5, 1.0)],
+        [add("instruments.fuel_flow_exponent_coeff", "1", 0.7, -1.0, 3.0)]),
+    cause!("co2_scale", Instrument,
+        "the CO2 meter reads too high" / "the CO2 meter reads too low",
+        [scale("instruments.co2_scale_coeff", 0.1, -0.5, 1.0)],
+        [add("instruments.co2_exponent_coeff", "1", 0.7, -1.0, 3.0)]),
 ];
 
 /// A cause by its id.

@@ -97,8 +97,20 @@ impl TruckModel {
         EgoState {
             speed_m_s: truth.speed_m_s * i.speed_scale_coeff,
             yaw_rate_rad_s: truth.yaw_rate_rad_s + i.yaw_rate_bias_rad_s,
+            powertrain: PowertrainSignals {
+                fuel_rate_g_s: i
+                    .reported_fuel_g_s(truth.powertrain.fuel_rate_g_s, self.engine.most_fuel_g_s),
+                ..truth.powertrain
+            },
             ..*truth
         }
+    }
+
+    /// CO2 in the exhaust, g/s, as an instrument of this truck measures it.
+    #[must_use]
+    pub fn measured_co2_g_s(&self, truth: &EgoState) -> f64 {
+        let i = &self.parameters.instruments;
+        i.measured_co2_g_s(truth.powertrain.fuel_rate_g_s, self.engine.most_fuel_g_s)
     }
 
     /// The paper's outputs.

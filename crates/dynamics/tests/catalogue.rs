@@ -11,7 +11,7 @@ const IDS: &str = "rolling_resistance air_drag headwind wind mass grade_bias map
     pedal_delay shift_duration fuel_map_low_load brake_gain brake_fade brake_delay hidden_retarder \
     speed_scale yaw_rate_bias steering_ratio steering_offset steering_free_play steering_lag \
     cornering_stiffness_front cornering_stiffness_drive cornering_stiffness_trailer \
-    payload_position road_bank crosswind engine_brake_torque";
+    payload_position road_bank crosswind engine_brake_torque fuel_flow_scale co2_scale";
 
 const PAYLOAD_KG: f64 = 20_000.0;
 
@@ -25,8 +25,8 @@ fn extended(cause: &Cause, sizes: &[f64]) -> TruckParameters {
 
 /// A drive over a road whose map is known: a climb at full load high up in the heat, coasting until
 /// it is slow, braking down the other side until the brakes are hot, then slalom; what the
-/// instruments report every 0.5 s.
-fn drive(truck: TruckParameters) -> Vec<EgoState> {
+/// instruments report every 0.5 s, and the CO2 in the exhaust, g/s.
+fn drive(truck: TruckParameters) -> Vec<(EgoState, f64)> {
     let model = TruckModel::new(truck, PAYLOAD_KG).unwrap();
     let instruments = model.parameters().instruments;
     let mut s = model.initial_state(0.0, 0.0, 0.0, 18.0);
@@ -50,19 +50,21 @@ fn drive(truck: TruckParameters) -> Vec<EgoState> {
         };
         let steering_wheel_rad = 0.3 * (0.4 * t).sin();
         s = model.step(&s, &Command { steering_wheel_rad, ..command }, &patch, 0.5).unwrap();
-        out.push(model.measured(&model.ego_state(&s, &patch)));
+        let truth = model.ego_state(&s, &patch);
+        out.push((model.measured(&truth), model.measured_co2_g_s(&truth)));
     }
     out
 }
 
 /// Largest difference of two drives, each signal in units of what an instrument can tell.
-fn difference(a: &[EgoState], b: &[EgoState]) -> f64 {
-    let one = |a: &EgoState, b: &EgoState| {
+fn difference(a: &[(EgoState, f64)], b: &[(EgoState, f64)]) -> f64 {
+    let one = |(a, a_co2_g_s): &(EgoState, f64), (b, b_co2_g_s): &(EgoState, f64)| {
         [
             (a.speed_m_s - b.speed_m_s) / 0.01,
             (a.yaw_rate_rad_s - b.yaw_rate_rad_s) / 1e-4,
             (a.trailer.yaw_rate_rad_s - b.trailer.yaw_rate_rad_s) / 1e-4,
             (a.powertrain.fuel_rate_g_s - b.powertrain.fuel_rate_g_s) / 0.02,
+            (a_co2_g_s - b_co2_g_s) / 0.1,
         ]
         .into_iter()
         .map(f64::abs)

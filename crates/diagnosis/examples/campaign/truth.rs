@@ -63,7 +63,7 @@ fn keys(id: &str, size: f64, shape: &Shape) -> Vec<(&'static str, f64, f64, f64)
             vec![("torque_nm", 0.0, 1.0, size), ("torque_per_stage_nm", 0.0, 1.0, size)]
         }
         "engine_brake_torque" => one("torque_scale", 1.0, 1.0),
-        "speed_scale" => one("scale", 1.0, 1.0),
+        "speed_scale" | "fuel_flow_scale" | "co2_scale" => one("scale", 1.0, 1.0),
         "yaw_rate_bias" => one("bias_rad_s", 0.0, 1.0),
         "steering_ratio" => one("ratio_scale", 1.0, 1.0),
         "steering_offset" => one("offset_rad", 0.0, 1.0),

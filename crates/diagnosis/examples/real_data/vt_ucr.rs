@@ -7,9 +7,10 @@ use std::path::Path;
 
 use diagnosis::RawTable;
 use diagnosis::balance::Body;
-use diagnosis::carbon::{CO2_PER_FUEL, Climb, Consumption, Doubt, FuelRecord, LoadBin};
+use diagnosis::carbon::{CO2_PER_FUEL_SIGMA, Climb, Consumption, Doubt, FuelRecord, LoadBin};
 use diagnosis::clock::{Kind, Rates, Signal, track};
 use dynamics::TruckParameters;
+use dynamics::effects::fuel::CO2_PER_FUEL;
 
 use crate::plot::{Panel, Series, write};
 use crate::table::{column, files, read, stem};
@@ -72,7 +73,7 @@ fn vehicle(
     let bins = record.ratio_by_load(&EDGES);
     println!(
         "  CO2 over fuel by load; chemistry says {:.3} +- {:.3}",
-        CO2_PER_FUEL.0, CO2_PER_FUEL.1
+        CO2_PER_FUEL, CO2_PER_FUEL_SIGMA
     );
     for b in &bins {
         println!(
@@ -200,7 +201,7 @@ fn picture(
                 y: "g/g",
                 series: vec![
                     Series { name: "measured", points: line(|b| b.ratio), line: true },
-                    Series { name: "chemistry", points: line(|_| CO2_PER_FUEL.0), line: true },
+                    Series { name: "chemistry", points: line(|_| CO2_PER_FUEL), line: true },
                     Series {
                         name: "+ 2 sigma",
                         points: line(|b| b.ratio + 2.0 * b.sigma),

@@ -5,8 +5,7 @@ use dynamics::{RoadPatch, TruckModel, TruckParameters};
 use tractrix_core::{BrakeMode, Command, ZERO_DEGC_K};
 
 use super::manoeuvre::{Foot, Plan, Until};
-use crate::channel::CHANNELS;
-use crate::logger::{Draw, Sample, as_logged};
+use crate::logger::{Draw, ON_BOARD, Sample, as_logged};
 use crate::{Channel, DiagnosisError, Drive};
 
 /// Payload that "loaded" means, kg.
@@ -35,7 +34,7 @@ pub(super) fn drive(
     let mut s = model.initial_state(0.0, 0.0, plan.heading_rad, plan.start_m_s);
     s.tyre_warmth = if plan.warm { 1.0 } else { 0.0 };
     let (mut foot, mut altitude_m) = (0.0_f64, plan.altitude_m);
-    let mut rows: Vec<[f64; CHANNELS]> = Vec::new();
+    let mut rows: Vec<[f64; ON_BOARD]> = Vec::new();
     let mut control = 0_u64;
     for step in plan.steps {
         let mut wished_m = 0.0_f64;
@@ -101,7 +100,7 @@ pub(super) fn drive(
                     map_curvature_1_m: curvature_1_m,
                 };
                 let mut row = sample.row();
-                for (channel, x) in Channel::all().zip(&mut row) {
+                for (channel, x) in Channel::on_board().zip(&mut row) {
                     *x = as_logged(channel, *x, draw);
                 }
                 rows.push(row);
@@ -113,8 +112,8 @@ pub(super) fn drive(
     let mut out = Drive::new(&name, 0.0, rows.len());
     out.reported_mass_kg = Some(model.mass_kg() / model.parameters().instruments.mass_scale_coeff);
     out.tyres_warm_at_start = Some(plan.warm);
-    for channel in Channel::all() {
-        out.set(channel, rows.iter().map(|r| r[channel as usize]).collect());
+    for (k, channel) in Channel::on_board().enumerate() {
+        out.set(channel, rows.iter().map(|r| r[k]).collect());
     }
     Ok(out)
 }

@@ -74,7 +74,7 @@ pub(crate) fn resolution(m: Module) -> f64 {
     match m {
         Module::Force | Module::Imu | Module::Gps => 1e-3,
         Module::Torque => 0.2,
-        Module::Fuel => 0.05,
+        Module::Fuel | Module::Co2 => 0.05,
         // messages of 4 kPa a bit, mean of two samples
         Module::Brake => 0.8,
         Module::Shift => 0.02,
@@ -87,6 +87,8 @@ fn order(m: Module) -> usize {
     match m {
         Module::Shift => 0,
         Module::Force | Module::Imu => 8,
+        // rows that are longer than what they remember
+        Module::Co2 => 2,
         _ => 6,
     }
 }

@@ -45,7 +45,8 @@ fn signals(truck: &TruckParameters) -> Drive {
     // Steps of a fine resolution, so that no rounding is left to the replay to mend.
     let pressure_kpa = |i: usize| 150.0 + 20.0 * wave(i, 1.7) + 2e-6 * (i % 2) as f64;
     set(C::BrakePressureKpa, &|i| if brakes(i) { pressure_kpa(i) } else { 0.0 });
-    set(C::FuelRateGS, &|i| 0.2 + 0.12 * percent(i));
+    set(C::FuelRateGS, &|i| 0.3 + 0.12 * percent(i));
+    set(C::Co2RateGS, &|i| 1.0 + 0.38 * percent(i));
     set(C::GradeFrac, &|i| if climbs(i) { 0.02 + 0.01 * wave(i, 40.0) } else { -0.04 });
     set(C::GpsAltitudeM, &|i| 2_200.0 + 50.0 * wave(i, 150.0));
     set(C::AmbientTempDegc, &|i| 38.0 + wave(i, 300.0));

@@ -7,6 +7,7 @@
 
 mod air;
 mod brake;
+mod co2;
 pub(crate) mod force;
 mod inputs;
 mod lateral;
@@ -51,10 +52,12 @@ pub enum Module {
     Heading,
     /// Longitudinal accelerometer against speed and grade, m/s over one second.
     Imu,
+    /// CO2 in the exhaust from the fuel rate, g/s over its own noise scale.
+    Co2,
 }
 
 /// Number of modules.
-pub(crate) const MODULES: usize = 12;
+pub(crate) const MODULES: usize = 13;
 
 use Module as M;
 
@@ -73,6 +76,7 @@ impl Module {
         M::Altitude,
         M::Heading,
         M::Imu,
+        M::Co2,
     ];
 
     /// The measured quantity that the module explains.
@@ -91,6 +95,7 @@ impl Module {
             M::Altitude => "gps_altitude_m",
             M::Heading => "heading_rad",
             M::Imu => "accel_x_m_s2",
+            M::Co2 => "co2_rate_g_s",
         }
     }
 
@@ -101,6 +106,7 @@ impl Module {
             M::Gps => 10,
             M::Fuel => 4,
             M::Shift => 1,
+            M::Co2 => co2::WINDOW,
             _ => 2,
         }
     }
@@ -120,9 +126,10 @@ pub(crate) enum Group {
     Altitude,
     Heading,
     Imu,
+    Co2,
 }
 
-pub(crate) const GROUPS: [Group; 10] = [
+pub(crate) const GROUPS: [Group; 11] = [
     Group::Force,
     Group::Torque,
     Group::Brake,
@@ -133,6 +140,7 @@ pub(crate) const GROUPS: [Group; 10] = [
     Group::Altitude,
     Group::Heading,
     Group::Imu,
+    Group::Co2,
 ];
 
 impl Group {
@@ -148,6 +156,7 @@ impl Group {
             Self::Altitude => &[M::Altitude],
             Self::Heading => &[M::Heading],
             Self::Imu => &[M::Imu],
+            Self::Co2 => &[M::Co2],
         }
     }
 }
@@ -193,6 +202,8 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::TorqueReport => &[G::Torque],
         P::ShiftTime => &[G::Shift],
         P::FuelLow | P::FuelLowLoad | P::FuelLowOver | P::FuelScale | P::FuelLag => &[G::Fuel],
+        P::FuelFlow | P::FuelFlowPower => &[G::Fuel, G::Co2],
+        P::Co2Scale | P::Co2Power => &[G::Co2],
         P::BrakeDelay | P::BrakeLoad => &[G::Brake],
         P::SpeedScale => &[G::Force, G::Lateral, G::Gps, G::Altitude, G::Imu],
         P::YawBias => &[G::Lateral, G::Heading],
@@ -265,6 +276,7 @@ pub(crate) fn replay_group(
         Group::Altitude => out[M::Altitude as usize] = sensors::altitude(d, t),
         Group::Heading => out[M::Heading as usize] = sensors::heading(d, t),
         Group::Imu => out[M::Imu as usize] = sensors::imu(d, t),
+        Group::Co2 => out[M::Co2 as usize] = co2::residual(d, plant, t),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Engine torque from pedal and engine speed, shift durations, fuel from torque and speed.
 
 use dynamics::effects::engine::left_frac;
+use dynamics::effects::instruments::scale_at_rate;
 use dynamics::effects::shift::ShiftPhase;
 use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 
@@ -154,6 +155,8 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
         (0..d.n).map(of).collect()
     });
     let (scale, low) = (1.0 + t[P::FuelScale as usize], t[P::FuelLow as usize]);
+    let (meter, power) = (t[P::FuelFlow as usize], t[P::FuelFlowPower as usize]);
+    let most_g_s = plant.engine.most_fuel_g_s;
     let per_load = 1.0 / (LOW_LOAD_FRAC * t[P::FuelLowLoad as usize].exp());
     // Between two samples their noise averages out, which is no sign of a lag.
     let between = lag - lag.floor();
@@ -171,7 +174,8 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 measured += 0.25 * d.fuel[i];
                 modelled += 0.25 * rate[i] * scale * (1.0 + extra);
             }
-            (measured - modelled) / (d.fuel_noise_g_s[k] * calmed)
+            modelled *= scale_at_rate(meter, power, modelled / most_g_s);
+            (measured - modelled) / (d.row_unit(M::Fuel, k) * calmed)
         })
         .collect()
 }

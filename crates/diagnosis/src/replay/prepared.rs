@@ -43,6 +43,7 @@ pub(crate) struct Prepared {
     pub(crate) trailer_yaw: Vec<f64>,
     pub(crate) accel_y: Vec<f64>,
     pub(crate) fuel: Vec<f64>,
+    pub(crate) co2: Vec<f64>,
     pub(crate) coolant: Vec<f64>,
     pub(crate) ambient: Vec<f64>,
     pub(crate) density: Vec<f64>,
@@ -50,9 +51,10 @@ pub(crate) struct Prepared {
     pub(crate) curvature: Vec<f64>,
     pub(crate) s_map: Vec<f64>,
     pub(crate) grade_by_s: GradeBySection,
-    /// Full-load torque at the engine speed and in the air of every sample, Nm.
-    /// Noise of the fuel rate per row, g/s.
-    pub(crate) fuel_noise_g_s: Vec<f64>,
+    /// Noise of the fuel rate and of the CO2 rate per row, g/s.
+    fuel_noise_g_s: Vec<f64>,
+    pub(super) co2_noise_g_s: Vec<f64>,
+    /// Full-load torque at the engine speed of every sample, Nm.
     pub(super) full_load: Vec<f64>,
     pub(super) balance: Inputs,
     pub(super) profiles: Profiles,
@@ -113,6 +115,9 @@ const CUT_OFF_PERCENT: f64 = 2.5;
 /// Torque above which nobody brakes, percent, and samples until brakes that were on are off.
 const PULLS: f64 = 3.0;
 const RELEASE: i32 = 30;
+
+/// Fuel rate below which an engine that runs may be said not to burn any, g/s: half of idling.
+const LEAST_FUEL_G_S: f64 = 0.2;
 
 /// Samples after which a pressure that rests under a demand that rests says nothing new: a truck
 /// that is held for an hour repeats the rounding of one message.
@@ -185,10 +190,12 @@ impl Prepared {
             trailer_yaw: get(C::TrailerYawRateRadS, 0.0),
             accel_y: get(C::AccelYMS2, 0.0),
             fuel: get(C::FuelRateGS, 0.0),
+            co2: get(C::Co2RateGS, 0.0),
             coolant: smooth::running_mean(&get(C::CoolantTempDegc, 80.0), smooth::COOLANT),
             curvature: get(C::Curvature1M, 0.0),
             grade_by_s: GradeBySection::new(&s_map, &grade),
             fuel_noise_g_s: super::powertrain::noise_g_s(&get(C::FuelRateGS, 0.0)),
+            co2_noise_g_s: super::co2::noise_g_s(&get(C::Co2RateGS, 0.0), &get(C::FuelRateGS, 0.0)),
             full_load,
             omega,
             turning,
@@ -228,7 +235,29 @@ impl Prepared {
             M::Altitude => &self.altitude,
             M::Heading => &self.heading,
             M::Imu => &self.accel_x,
+            M::Co2 => &self.co2,
         }
+    }
+
+    /// The unit of a row's residual in that of the module's quantity: rates come over a noise that
+    /// grows with them.
+    pub(crate) fn row_unit(&self, m: M, row: usize) -> f64 {
+        let noise = match m {
+            M::Fuel => &self.fuel_noise_g_s,
+            M::Co2 => &self.co2_noise_g_s,
+            _ => return 1.0,
+        };
+        noise.get(row).copied().unwrap_or(1.0)
+    }
+
+    /// The same on the average of the drive.
+    pub(crate) fn mean_unit(&self, m: M) -> f64 {
+        let noise = match m {
+            M::Fuel => &self.fuel_noise_g_s,
+            M::Co2 => &self.co2_noise_g_s,
+            _ => return 1.0,
+        };
+        noise.iter().sum::<f64>() / noise.len().max(1) as f64
     }
 
     /// What a fitted table of the truck file follows.
@@ -363,6 +392,11 @@ impl Prepared {
         }
         if self.has(&[C::AccelXMS2, C::GradeFrac]) {
             valid[M::Imu as usize] = seconds(M::Imu, &|i| self.speed[i] > 3.0);
+        }
+        if self.has(&[C::FuelRateGS, C::Co2RateGS]) {
+            // An engine that stands still has no ratio.
+            let burns = |i: usize| self.fuel[i] > LEAST_FUEL_G_S;
+            valid[M::Co2 as usize] = rows(M::Co2, &|a, b| (a..b).all(burns));
         }
         for (a, v) in self.available.iter_mut().zip(&valid) {
             *a = v.iter().filter(|x| **x).count() >= 8;

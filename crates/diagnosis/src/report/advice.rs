@@ -55,6 +55,10 @@ pub fn advice(id: &str) -> &'static str {
         "speed_scale" => {
             "Correct the tyre size in the tachograph; all distances and speeds are off by this factor."
         }
+        "fuel_flow_scale" => {
+            "Weigh the fuel of a drive and correct the control unit's rate by it; consumption from the bus is off by this factor."
+        }
+        "co2_scale" => "Calibrate the analyser with span gas, and the tunnel's flow.",
         "yaw_rate_bias" => "Calibrate the gyro at standstill.",
         "steering_ratio" => "Check the steering gear's ratio on the type plate.",
         "steering_offset" => "Centre the hand wheel sensor, or align the steer axle.",

@@ -48,6 +48,7 @@ fn words(m: Module) -> (&'static str, &'static str, f64) {
         Module::Altitude => ("altitude along the map", "m", 1.0),
         Module::Heading => ("heading", "°", degree),
         Module::Imu => ("longitudinal acceleration", "m/s²", 1.0),
+        Module::Co2 => ("the CO2 rate over the fuel rate's", "g/s", 1.0),
     }
 }
 
@@ -93,8 +94,7 @@ fn sums(drives: &[&Prepared], plant: &Plant, models: &Models, id: &str) -> [Sums
             for (k, ((with, less), _)) in rows.filter(|(_, (_, ok))| **ok) {
                 let scale = match m {
                     Module::Force => d.mass_kg,
-                    Module::Fuel => d.fuel_noise_g_s.get(k).copied().unwrap_or(1.0),
-                    _ => 1.0,
+                    _ => d.row_unit(m, k),
                 };
                 // Residuals are measured less modelled.
                 let change = less - with;

@@ -32,8 +32,7 @@ impl Rows {
             v
         };
         let mut sigma = m.sigma;
-        let rows = drive.fuel_noise_g_s.len().max(1) as f64;
-        sigma[Module::Fuel as usize] *= drive.fuel_noise_g_s.iter().sum::<f64>() / rows;
+        Module::ALL.iter().for_each(|m| sigma[*m as usize] *= drive.mean_unit(*m));
         let residuals = |theta| physical(&drive, replay(&drive, plant, theta));
         Self {
             before: residuals(&m.before),
@@ -95,10 +94,10 @@ impl Rows {
     }
 }
 
-/// The fuel residual is over its noise scale; the others are in their quantity's unit.
+/// Residuals in their quantity's unit.
 fn physical(d: &Prepared, mut r: Residuals) -> Residuals {
-    for (x, noise) in r[Module::Fuel as usize].iter_mut().zip(&d.fuel_noise_g_s) {
-        *x *= noise;
+    for (m, rows) in Module::ALL.into_iter().zip(&mut r) {
+        rows.iter_mut().enumerate().for_each(|(k, x)| *x *= d.row_unit(m, k));
     }
     r
 }

@@ -29,7 +29,7 @@ pub struct Trace {
 /// Length of a close look, s.
 const FOCUS_S: f64 = 120.0;
 /// Modules whose residual is the measured signal minus a modelled one.
-const SHOWN: [Module; 7] = [
+const SHOWN: [Module; 8] = [
     Module::Torque,
     Module::Brake,
     Module::Fuel,
@@ -37,6 +37,7 @@ const SHOWN: [Module; 7] = [
     Module::TrailerYaw,
     Module::Gps,
     Module::Altitude,
+    Module::Co2,
 ];
 /// Most quantities shown beside the speed.
 const MOST: usize = 3;
@@ -142,5 +143,6 @@ pub(super) fn title(m: Module) -> &'static str {
         Module::Altitude => "GPS altitude from the map",
         Module::Heading => "Heading from the yaw rate",
         Module::Imu => "Accelerometer from speed and grade",
+        Module::Co2 => "CO2 in the exhaust from the fuel rate",
     }
 }

@@ -7,7 +7,7 @@ use super::bodies::{Bodies, State};
 use super::driver::{Driver, View};
 use super::effects::{self, Acting, Effect, Memory, Now};
 use super::engine::Drivetrain;
-use super::logger::{LOGGED, log, smooth};
+use super::logger::{Exhaust, LOGGED, log, smooth};
 use super::outside;
 use super::random::{between, normal};
 use super::road::Road;
@@ -84,6 +84,7 @@ pub(crate) fn drive(
     let samples = (duration_s / Drive::STEP_S) as usize;
     let mut truth: Vec<Vec<f64>> = (0..LOGGED).map(|_| Vec::with_capacity(samples)).collect();
     let matched = smooth(samples, 3.0, 1.0, rng);
+    let mut exhaust = Exhaust::new(1.2, 1.0, tolerance, rng);
     let (mut v, mut place, mut altitude) = (0.5_f64, 0.0_f64, setting.altitude_m);
     let mut heading = between(rng, -3.0, 3.0);
     let mut course = heading;
@@ -180,6 +181,11 @@ pub(crate) fn drive(
             (1.0 - f.side_share) * blown + a.side_n[1] - trailer_kg * G * f.bank_rad,
         ];
         if i % 5 == 0 {
+            let fuel =
+                (0.05 + 0.000_12 * train.rpm + 0.0505 * train.indicated_nm * train.rpm / 9549.3)
+                    * f.fuel_scale
+                    * a.fuel;
+            exhaust.burn(fuel, a.meters[1]);
             let side = bodies.rate(&lateral, rolled, delta, force)[0] + rolled * lateral[1];
             let seen = place + matched[i / 5];
             let row = [
@@ -201,9 +207,7 @@ pub(crate) fn drive(
                 (lateral[1] + f.yaw_bias) * a.yaw[0] + a.yaw[1],
                 (lateral[2] + f.trailer_yaw_bias) * a.trailer_yaw[0] + a.trailer_yaw[1],
                 (side + G * f.bank_rad) * a.accel_y[0] + a.accel_y[1] + f.accel_bias[1],
-                (0.05 + 0.000_12 * train.rpm + 0.0505 * train.indicated_nm * train.rpm / 9549.3)
-                    * f.fuel_scale
-                    * a.fuel,
+                fuel * a.meters[0],
                 coolant,
                 air_degc,
                 air_pa,
@@ -226,6 +230,7 @@ pub(crate) fn drive(
     let mut out = Drive::new(name, 0.0, samples);
     out.reported_mass_kg = Some((sheet_kg * 10.0).round() / 10.0);
     out.tyres_warm_at_start = Some(setting.warm);
+    exhaust.log(&mut out);
     log(&mut out, &truth, rng);
     out
 }

@@ -41,7 +41,7 @@ impl Shape {
 }
 
 /// Id, medium size, whether either sign occurs.
-pub(crate) const SIZES: [(&str, f64, bool); 35] = [
+pub(crate) const SIZES: [(&str, f64, bool); 37] = [
     ("rolling_resistance", 0.16, true),
     ("air_drag", 0.13, true),
     ("headwind", 2.2, true),
@@ -77,6 +77,8 @@ pub(crate) const SIZES: [(&str, f64, bool); 35] = [
     ("road_bank", 0.014, true),
     ("crosswind", 4.0, true),
     ("engine_brake_torque", 0.22, true),
+    ("fuel_flow_scale", 0.08, true),
+    ("co2_scale", 0.1, true),
 ];
 
 /// How large a hidden cause is.
@@ -199,6 +201,8 @@ pub(crate) struct Acting {
     pub(crate) friction: f64,
     /// Factor on the fuel.
     pub(crate) fuel: f64,
+    /// Factors of the fuel meter and of the CO2 meter.
+    pub(crate) meters: [f64; 2],
     /// Factor and offset of the logged yaw rate, trailer yaw rate, lateral acceleration, GPS speed.
     pub(crate) yaw: [f64; 2],
     pub(crate) trailer_yaw: [f64; 2],
@@ -219,6 +223,7 @@ impl Acting {
         pressure: [1.0, 0.0],
         friction: 1.0,
         fuel: 1.0,
+        meters: [1.0; 2],
         yaw: [1.0, 0.0],
         trailer_yaw: [1.0, 0.0],
         accel_y: [1.0, 0.0],
@@ -296,6 +301,19 @@ pub(crate) fn act(
             };
             let fall = (now.speed / 5.0).min(1.0) * (1.0 + shape.at(2, -0.2, 0.2));
             a.force_n += on * size * AXLE / RADIUS_M * fall;
+        }
+        "fuel_flow_scale" | "co2_scale" => {
+            // Of the rate at full load: alike at all loads, in proportion, or from a load on.
+            let load = now.indicated_nm * now.rpm / 9549.3 / 455.0;
+            let course = match shape.choice(0, 3) {
+                0 => 1.0,
+                1 => load.powf(shape.at(1, 0.4, 1.5)),
+                _ => {
+                    let from = shape.at(1, 0.0, 0.3);
+                    ((load - from) / (1.0 - from)).clamp(0.0, 1.1)
+                }
+            };
+            a.meters[usize::from(id == "co2_scale")] *= 1.0 + size * course;
         }
         "fuel_map_low_load" => {
             let (x, knee) = match shape.choice(0, 3) {

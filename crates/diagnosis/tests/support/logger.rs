@@ -1,4 +1,7 @@
-//! The logger: J1939 resolution, rates by sample and hold, sensor noise.
+//! The logger: J1939 resolution, rates by sample and hold, sensor noise; and a laboratory that measures
+//! CO2 in the exhaust beside it.
+
+use std::collections::VecDeque;
 
 use diagnosis::{Channel as C, Drive};
 use rand_chacha::ChaCha8Rng;
@@ -57,6 +60,51 @@ pub(crate) fn log(drive: &mut Drive, truth: &[Vec<f64>], rng: &mut ChaCha8Rng) {
         });
         let samples = samples.collect();
         drive.set(*channel, samples);
+    }
+}
+
+/// CO2 in the exhaust, through exhaust, tunnel and analyser. Its random numbers are its own, so that
+/// the rest of a drive is what it was without it.
+pub(crate) struct Exhaust {
+    rng: ChaCha8Rng,
+    scale: f64,
+    late: VecDeque<f64>,
+    keep: f64,
+    mixed: f64,
+    measured: Vec<f64>,
+}
+
+impl Exhaust {
+    /// Carbon of diesel as CO2, g/g.
+    const PER_FUEL: f64 = 3.169;
+    /// Noise of the rate, and the analyser's scatter from day to day.
+    const NOISE: [f64; 2] = [0.02, 0.006];
+
+    /// With this dead time and mixing time, s.
+    pub(crate) fn new(dead_s: f64, mixing_s: f64, tolerance: f64, rng: &ChaCha8Rng) -> Self {
+        let mut rng = rng.clone();
+        rng.set_stream(rng.get_stream() + (1 << 32));
+        Self {
+            scale: 1.0 + tolerance * Self::NOISE[1] * normal(&mut rng),
+            late: vec![0.5; (dead_s / Drive::STEP_S) as usize].into(),
+            keep: (-Drive::STEP_S / mixing_s).exp(),
+            mixed: 0.5,
+            measured: Vec::new(),
+            rng,
+        }
+    }
+
+    /// One sample: fuel burnt, g/s, and a factor of the meter.
+    pub(crate) fn burn(&mut self, fuel: f64, factor: f64) {
+        self.late.push_back(fuel * factor);
+        let now = self.late.pop_front().unwrap_or(fuel);
+        self.mixed = now + (self.mixed - now) * self.keep;
+        let noise = 1.0 + Self::NOISE[0] * normal(&mut self.rng);
+        self.measured.push(Self::PER_FUEL * self.mixed * self.scale * noise);
+    }
+
+    pub(crate) fn log(self, drive: &mut Drive) {
+        drive.set(C::Co2RateGS, self.measured);
     }
 }
 

@@ -215,6 +215,8 @@ pub struct Engine {
     pub max_rad_s: f64,
     /// Fuel flow: the same model that planner and diagnosis read.
     pub fuel: FuelModel,
+    /// Highest fuel flow at full load, g/s.
+    pub most_fuel_g_s: f64,
 }
 
 impl Engine {
@@ -224,8 +226,15 @@ impl Engine {
     /// [`tractrix_core::CoreError::BadTable`] names a table that cannot be used.
     pub fn new(p: EngineParameters) -> Result<Self, tractrix_core::CoreError> {
         let speed: Vec<f64> = p.full_load_speed_rpm.iter().map(|n| n / RPM_PER_RAD_S).collect();
+        let fuel = p.fuel.model(p.fuel_map.as_ref(), p.nominal_friction()?)?;
+        let full_load = p.full_load_speed_rpm.iter().zip(&p.full_load_torque_nm);
+        let flows_g_s = full_load.map(|(rpm, brake_nm)| {
+            let friction_nm = p.friction_constant_nm + p.friction_per_rpm_nm * rpm;
+            fuel.rate_g_s(rpm / RPM_PER_RAD_S, brake_nm + friction_nm)
+        });
         Ok(Self {
-            fuel: p.fuel.model(p.fuel_map.as_ref(), p.nominal_friction()?)?,
+            most_fuel_g_s: flows_g_s.fold(0.0, f64::max),
+            fuel,
             full_load_nm: Curve::new("full_load_torque_nm", speed, p.full_load_torque_nm.clone())?,
             pedal_map_nm: p.pedal_map.as_ref().map(PedalMap::grid).transpose()?,
             idle_rad_s: p.idle_speed_rpm / RPM_PER_RAD_S,

@@ -16,6 +16,9 @@ use tractrix_core::{CoreError, Curve, FuelModel, Grid, LowLoadFuel, RPM_PER_RAD_
 
 use crate::bounds::Bounds;
 
+/// CO2 over burnt diesel by mass: carbon fraction 0.865 times 44.01/12.011.
+pub const CO2_PER_FUEL: f64 = 3.169;
+
 /// The fuel block of a truck file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -53,7 +53,7 @@ const COUNTS: &[Unit] = &[("", 1.0), ("1", 1.0), ("-", 1.0), ("gear", 1.0), ("bi
 /// Of a kPa.
 const PRESSURES: &[Unit] =
     &[("kpa", 1.0), ("pa", 1e-3), ("hpa", 0.1), ("mbar", 0.1), ("bar", 100.0), ("psi", 6.894_757)];
-const FUEL_MASSES: &[Unit] = &[("g/s", 1.0), ("kg/h", 1.0 / 3.6), ("mg/s", 1e-3)];
+const MASS_RATES: &[Unit] = &[("g/s", 1.0), ("kg/h", 1.0 / 3.6), ("mg/s", 1e-3)];
 /// Of a m³/s.
 const FUEL_VOLUMES: &[Unit] = &[("l/h", 1e-3 / 3600.0), ("ml/s", 1e-6), ("l/s", 1e-3)];
 
@@ -80,9 +80,10 @@ pub(super) fn conversion(column: Channel, unit: &str) -> Result<Conversion, Stri
             };
         }
         C::FuelRateGS => {
-            let found = scaled(FUEL_MASSES, 1.0, false).or(scaled(FUEL_VOLUMES, 1.0, true));
-            return found.ok_or_else(|| names(&[FUEL_MASSES, FUEL_VOLUMES].concat()));
+            let found = scaled(MASS_RATES, 1.0, false).or(scaled(FUEL_VOLUMES, 1.0, true));
+            return found.ok_or_else(|| names(&[MASS_RATES, FUEL_VOLUMES].concat()));
         }
+        C::Co2RateGS => (MASS_RATES, 1.0),
         C::SpeedMS | C::GpsSpeedMS => (SPEEDS, 1.0),
         C::GpsAltitudeM | C::SMapM => (LENGTHS, 1.0),
         C::HeadingRad | C::SteeringWheelRad => (ANGLES, 1.0),

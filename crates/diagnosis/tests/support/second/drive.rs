@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 
 use super::super::Campaign;
 use super::super::effects::Effect;
-use super::super::logger::{LOGGED, log};
+use super::super::logger::{Exhaust, LOGGED, log};
 use super::super::random::between;
 use super::super::sheet::{G, RADIUS_M, engine_brake};
 
@@ -18,6 +18,7 @@ use super::engine::Engine;
 use super::faults::{Faults, Moment};
 use super::gearbox::Gearbox;
 use super::instruments::Instruments;
+use super::meters::Meters;
 use super::outside::{self, Memory, Outcome};
 use super::resistance::Ground;
 use super::road::Route;
@@ -68,6 +69,8 @@ pub(crate) fn drive(
     let mut ground = Ground::new(&faults, trip.warm, rng);
     let mut air = Air::new(&f, &faults, rng);
     let mut instruments = Instruments::new(&faults, rng);
+    let mut meters = Meters::new(&faults);
+    let mut exhaust = Exhaust::new(1.8, 0.6, campaign.tolerance, rng);
     let mut chassis = Chassis::new(mass, trip.payload_kg, &f, &faults);
     let (tractor_kg, trailer_kg, trailer_cg) = chassis.bodies();
     let pedal_fault = faults.get("pedal_delay");
@@ -167,6 +170,9 @@ pub(crate) fn drive(
         instruments.go(v * STEP_S, rng, STEP_S);
         let percent = engine.reported(rng, STEP_S);
         if i % EVERY == 0 {
+            let fuel = engine.fuel(&f, gearbox.rpm) * o.fuel;
+            let [fuel_seen, carbon_seen] = meters.act(fuel, engine.coolant_degc);
+            exhaust.burn(fuel, carbon_seen);
             let [seen, map_grade, map_curvature] = instruments.seen(&f, &route, place);
             let row = [
                 seen,
@@ -187,7 +193,7 @@ pub(crate) fn drive(
                 (yaw + instruments.yaw_bias(&f)) * o.yaw,
                 trailer_yaw + f.trailer_yaw_bias,
                 side + G * bank + f.accel_bias[1],
-                engine.fuel(&f, gearbox.rpm) * o.fuel,
+                fuel * fuel_seen,
                 engine.coolant_degc,
                 air_degc,
                 air_pa,
@@ -209,6 +215,7 @@ pub(crate) fn drive(
     let mut out = Drive::new(name, 0.0, samples);
     out.reported_mass_kg = Some((sheet_kg * 10.0).round() / 10.0);
     out.tyres_warm_at_start = Some(trip.warm);
+    exhaust.log(&mut out);
     log(&mut out, &truth, rng);
     out
 }

@@ -14,6 +14,7 @@ pub(crate) mod engine;
 pub(crate) mod faults;
 pub(crate) mod gearbox;
 pub(crate) mod instruments;
+pub(crate) mod meters;
 pub(crate) mod outside;
 pub(crate) mod resistance;
 pub(crate) mod road;

@@ -47,7 +47,7 @@ pub(super) fn drive(
     let mut world = World::assemble(scenario, seed, Arc::clone(road), Arc::new(model))
         .map_err(Failure::work)?;
     let columns: Vec<&str> =
-        std::iter::once(TIME).chain(Channel::all().map(Channel::name)).collect();
+        std::iter::once(TIME).chain(Channel::on_board().map(Channel::name)).collect();
     let mut table = Table::new(name, &columns);
     table.reported_mass_kg = Some(reported_mass_kg);
     let mut draw = Draw::of_seed(seed);
@@ -73,6 +73,6 @@ fn row(world: &World, latest: &Latest, draw: &mut Draw) -> Vec<f64> {
         map_grade_frac: on_map.grade_rad.tan(),
         map_curvature_1_m: on_map.curvature_1_m,
     };
-    let logged = Channel::all().zip(sample.row()).map(|(c, x)| as_logged(c, x, draw));
+    let logged = Channel::on_board().zip(sample.row()).map(|(c, x)| as_logged(c, x, draw));
     std::iter::once(latest.now_s).chain(logged).collect()
 }
