@@ -15,9 +15,28 @@ pub struct Drive {
     pub reported_mass_kg: Option<f64>,
     /// Tyres were warm at the start; unknown if the index does not say.
     pub tyres_warm_at_start: Option<bool>,
+    /// Nobody logged the gear: it is the nearest to engine over road speed, and a converter may slip.
+    pub gear_derived: bool,
     /// Road map by position, if the index names one.
     pub map: Option<RoadMap>,
+    /// The readings of a drive that is in neutral from begin to end.
+    pub coast_down: Option<CoastDown>,
     channels: [Option<Vec<f64>>; CHANNELS],
+}
+
+/// A coast-down as it was read: a truck in neutral that nobody brakes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoastDown {
+    /// Times, s from the first reading on.
+    pub time_s: Vec<f64>,
+    /// Speeds, m/s.
+    pub speed_m_s: Vec<f64>,
+    /// Time between two rows of its table, s; a reading is the mean of those of five seconds.
+    pub step_s: f64,
+    /// Standard deviation of the times, s.
+    pub time_sigma_s: f64,
+    /// Standard deviation of the speeds, m/s.
+    pub speed_sigma_m_s: f64,
 }
 
 /// Grade and curvature over the position on the map.
@@ -44,7 +63,9 @@ impl Drive {
             len,
             reported_mass_kg: None,
             tyres_warm_at_start: None,
+            gear_derived: false,
             map: None,
+            coast_down: None,
             channels: Default::default(),
         }
     }

@@ -97,6 +97,16 @@ pub enum FindingKind {
         /// Standard deviation of the jump, s.
         sigma_s: f64,
     },
+    /// There is no gear: the ratio of engine and road speed is taken, whatever slips.
+    RatioMeasured {
+        /// Part of the driving in which it is that of a gear of the truck file.
+        fits_frac: f64,
+    },
+    /// There is no grade; it was worked out from altitude.
+    GradeFromAltitude {
+        /// Its standard deviation, rise over run.
+        sigma_frac: f64,
+    },
     /// The index names another truck than the truck file.
     TruckName {
         /// Name in the index.
@@ -146,6 +156,15 @@ impl core::fmt::Display for FindingKind {
                 f,
                 "its lag behind {against} jumps from {before_s:.2} to {after_s:.2} ± {sigma_s:.2} s"
             ),
+            Self::RatioMeasured { fits_frac } => write!(
+                f,
+                "there is none; engine over road speed is taken as the ratio, which is that of a gear \
+                 of the truck file in {:.0} % of the driving",
+                100.0 * fits_frac
+            ),
+            Self::GradeFromAltitude { sigma_frac } => {
+                write!(f, "there is none; worked out from altitude, to {:.2} %", 100.0 * sigma_frac)
+            }
             Self::TruckName { index } => write!(f, "the index names the truck {index:?}"),
         }
     }

@@ -48,7 +48,7 @@ pub(crate) fn drive_error_by(
         while start + steps < d.n {
             let mut v = d.speed[start];
             for i in start..start + steps {
-                let moving = d.engaged[i] && d.speed[i] > 3.0;
+                let moving = (d.engaged[i] || d.coasts) && d.speed[i] > 3.0;
                 let [a] = model.acceleration(i, &[v.max(0.5) * scale]);
                 v += if moving { a * Drive::STEP_S / scale } else { d.speed[i + 1] - d.speed[i] };
                 v = v.clamp(0.0, 60.0);

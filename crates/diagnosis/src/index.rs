@@ -30,6 +30,11 @@ pub(crate) struct Entry {
     pub(crate) map: Option<String>,
     pub(crate) reported_mass_kg: Option<f64>,
     pub(crate) tyres_warm_at_start: Option<bool>,
+    /// Of a coast-down: standard deviations of its readings, where they are no logger's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) time_sigma_s: Option<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) speed_sigma_m_s: Option<f64>,
 }
 
 impl Index {
@@ -71,6 +76,8 @@ pub fn drives_index(truck: &str, tables: &[Table]) -> Result<String, DiagnosisEr
         map: t.map.clone(),
         reported_mass_kg: t.reported_mass_kg,
         tyres_warm_at_start: t.tyres_warm_at_start,
+        time_sigma_s: None,
+        speed_sigma_m_s: None,
     };
     let drive = tables.iter().map(entry).collect();
     let index = Index { schema: SCHEMA, truck: truck.to_owned(), drive };

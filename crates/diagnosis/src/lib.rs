@@ -16,13 +16,10 @@
 //! ```
 #![cfg_attr(test, allow(clippy::indexing_slicing))]
 
-pub mod balance;
-pub mod carbon;
 mod catch_all;
 mod causes;
 mod channel;
 pub mod clock;
-pub mod coast_down;
 mod course;
 mod detectable;
 mod diagnosis;
@@ -73,7 +70,7 @@ mod whole_run;
 pub use channel::Channel;
 pub use detectable::Detectable;
 pub use diagnosis::{Baseline, Options, Progress, diagnose, diagnose_with};
-pub use drive::{Drive, DriveSet, RoadMap};
+pub use drive::{CoastDown, Drive, DriveSet, RoadMap};
 pub use drive_use::{DriveRole, DriveUse, SizeAlone};
 pub use dynamics::catalogue::CauseKind;
 pub use error::DiagnosisError;

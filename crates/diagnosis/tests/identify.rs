@@ -5,7 +5,7 @@
 mod support;
 
 use diagnosis::identify::identify;
-use diagnosis::{Channel as C, DiagnosisError, Serial};
+use diagnosis::{Channel as C, DiagnosisError, FindingKind, Serial};
 use dynamics::{KnownBy, TruckParameters};
 use support::nominal::{Off, off};
 use support::{Campaign, generate};
@@ -58,6 +58,32 @@ fn what_no_channel_shows_keeps_its_figure_and_says_which_channels_are_missing() 
         assert_eq!(found.truck.parameter(path), truck.parameter(path), "{path}");
     }
     assert!(found.figures.iter().any(|f| f.path == "resistance.drag_area_m2"));
+}
+
+/// A bus of many trucks has no gear, and a converter slips: the ratio is engine over road speed.
+#[test]
+fn without_a_gear_the_ratio_is_measured_and_says_so() {
+    let Off { truck, truth, common } = off(4);
+    let mut set = generate(&common, &SHORT, 61);
+    for d in &mut set.drives {
+        d.remove(C::Gear);
+        d.remove(C::ShiftInProcess);
+    }
+    let found = identify(&truck, &set, &Serial).unwrap();
+    let fits = found.findings.iter().find_map(|f| match f.kind {
+        FindingKind::RatioMeasured { fits_frac } => Some(fits_frac),
+        _ => None,
+    });
+    assert!(fits.is_some_and(|f| f > 0.8), "{fits:?}");
+    let told = |path: &str| found.figures.iter().find(|f| f.path == path);
+    let drag = told("resistance.drag_area_m2").unwrap();
+    let rolling = told("resistance.rolling_coeff").unwrap();
+    for f in [drag, rolling] {
+        let off = (f.value - truth[&f.path]).abs();
+        assert!(off < 2.5 * f.sigma && f.sigma < 0.08 * f.value, "{f:?}");
+    }
+    let why = &found.not_told.iter().find(|n| n.path == "driveline.wheel_radius_m").unwrap().why;
+    assert!(why.contains("gear is missing"), "{why}");
 }
 
 #[test]

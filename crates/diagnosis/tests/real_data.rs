@@ -4,6 +4,8 @@
 
 #[path = "../examples/real_data/bosch.rs"]
 mod bosch;
+#[path = "../examples/real_data/drives.rs"]
+mod drives;
 #[path = "../examples/real_data/isuzu.rs"]
 mod isuzu;
 #[path = "../examples/real_data/ostfalia.rs"]
@@ -17,11 +19,10 @@ mod table;
 #[path = "../examples/real_data/vt_ucr.rs"]
 mod vt_ucr;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use diagnosis::FindingKind;
-use diagnosis::coast_down::place;
-use dynamics::effects::fuel::CO2_PER_FUEL;
+use diagnosis::identify::identify;
+use diagnosis::{FindingKind, Options, Plant, Serial, Verdict, diagnose, read_drives};
 use dynamics::{Overlay, TruckParameters};
 
 type Outcome<T = ()> = Result<T, Box<dyn std::error::Error>>;
@@ -73,29 +74,63 @@ fn lost_rows_of_a_receiver_show_as_jumps_of_its_clock_of_their_size() {
     }
 }
 
+/// Mass, drag area and rolling resistance of the FASTSim vehicle file, if there is one.
+fn reference(dir: &Path) -> Option<[f64; 3]> {
+    let text = std::fs::read_to_string(dir.join("vehicle_params_fastsim.csv")).ok()?;
+    let value = |key: &str| {
+        text.lines().find_map(|l| {
+            let mut f = l.split(',').skip(1);
+            (f.next() == Some(key)).then(|| f.next()?.parse::<f64>().ok()).flatten()
+        })
+    };
+    Some([
+        value("veh_override_kg")?,
+        value("drag_coef")? * value("frontal_area_m2")?,
+        value("wheel_rr_coef")?,
+    ])
+}
+
+/// The coast-downs and the log through `identify`: every interval holds what NREL says.
 #[test]
-fn coast_downs_give_drag_and_rolling_resistance_within_their_intervals() {
+fn coast_downs_and_a_log_without_gears_give_the_road_load_within_its_intervals() {
     let Some(dir) = folder("isuzu_npr_nrel") else { return };
-    let truck = truck(include_str!("../examples/real_data/trucks/isuzu_npr.toml"));
-    let (fit, reference) = isuzu::study(&dir, None, &truck).unwrap();
-    let [_, drag_area, rolling] = reference.unwrap();
-    for (k, truth) in [(place::DRAG_AREA, drag_area), (place::ROLLING, rolling)] {
-        let z = (fit.value[k] - truth) / fit.sigma(k);
-        assert!(z.abs() < 1.96 && fit.sigma(k) < 0.2 * truth, "{k}: {z} sigma");
+    let text = include_str!("../examples/real_data/trucks/isuzu_npr.toml");
+    let truck = TruckParameters::from_toml_str("isuzu_npr", text).unwrap();
+    let [mass_kg, drag_area, rolling] = reference(&dir).unwrap();
+    let out = tempfile::tempdir().unwrap();
+    isuzu::prepare(&dir, out.path(), &truck).unwrap();
+    let found = identify(&truck, &read_drives(out.path()).unwrap(), &Serial).unwrap();
+    for (path, true_value, most_frac) in [
+        ("resistance.drag_area_m2", drag_area, 0.11),
+        ("resistance.rolling_coeff", rolling, 0.05),
+        ("instruments.mass_scale_coeff", mass_kg / 6590.0, 0.12),
+    ] {
+        let f = found.figures.iter().find(|f| f.path == path).unwrap();
+        println!("{path}: {} +- {}, 90 % interval {:?}", f.value, f.sigma, f.interval_90);
+        let z = (f.value - true_value) / f.sigma;
+        assert!(z.abs() < 1.96 && f.sigma < most_frac * true_value, "{path}: {z} sigma, {f:?}");
     }
 }
 
+/// A truck whose fuel and CO2 disagree, without its engine's torque: both meters are rivals.
 #[test]
-fn fuel_and_carbon_of_a_truck_disagree_with_load() {
+fn fuel_and_carbon_of_a_truck_disagree_and_nothing_says_which_is_wrong() {
     let Some(dir) = folder("vt_ucr_hddt") else { return };
     let truck = truck(include_str!("../examples/real_data/trucks/vt_ucr.toml"));
-    for (bins, consumption) in vt_ucr::study(&dir, None, &truck).unwrap() {
-        let (first, last) = (bins.first().unwrap(), bins.last().unwrap());
-        assert!(first.ratio - last.ratio > 4.0 * first.sigma.hypot(last.sigma));
-        assert!(last.ratio < CO2_PER_FUEL - 4.0 * last.sigma);
-        let c = consumption.unwrap();
-        assert!(c.fuel_g_kwh > 1.15 * c.carbon_g_kwh);
-    }
+    let out = tempfile::tempdir().unwrap();
+    vt_ucr::prepare(&dir, out.path(), &truck).unwrap();
+    let drives = read_drives(out.path()).unwrap();
+    let plant = Plant::of_truck(&truck).unwrap();
+    let options = Options::default();
+    let found = diagnose(&plant, &drives, None, &options, &Serial, &mut |_| {}).unwrap();
+    assert_eq!(found.verdict, Verdict::Ambiguous, "{:?}", found.causes);
+    let mut ids: Vec<&str> = found.causes.iter().map(|c| c.id).collect();
+    ids.extend(found.causes[0].confused_with.iter().map(|c| c.id));
+    ids.sort_unstable();
+    assert_eq!(ids, ["co2_scale", "fuel_flow_scale"]);
+    let scale = found.causes[0].parameters["scale"];
+    assert!(((scale.value - 1.0).abs() - 0.2).abs() < 0.06 && scale.sigma < 0.03, "{scale:?}");
+    assert!(found.gain.unwrap().significant);
 }
 
 #[test]

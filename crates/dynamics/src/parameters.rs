@@ -21,7 +21,7 @@ use crate::effects::resistance::ResistanceParameters;
 use crate::effects::shift::ShiftParameters;
 use crate::effects::table::TableEffect;
 use crate::lateral::LateralParameters;
-use crate::provenance::{self, Provenance};
+use crate::provenance::{self, FigureOrigin, KnownBy, Provenance};
 
 const BUILTIN: [(&str, &str); 5] = [
     ("longhaul", include_str!("../trucks/longhaul.toml")),
@@ -108,7 +108,7 @@ pub struct Overlay {
 pub struct OverlayValue {
     /// The new value, in the unit of the path's last key.
     pub value: f64,
-    /// Standard deviation of the value, same unit.
+    /// Standard deviation of the value, same unit; goes into the truck's `[provenance]`.
     #[serde(default)]
     pub sigma: Option<f64>,
     /// Lowest and highest value considered.
@@ -183,6 +183,15 @@ impl TruckParameters {
         let mut truck = self.clone();
         for (path, new) in &overlay.set {
             truck.provenance.remove(path);
+            if new.sigma.is_some() {
+                let origin = FigureOrigin {
+                    known_by: KnownBy::Estimate,
+                    sigma: new.sigma,
+                    interval_90: None,
+                    source: new.source.clone(),
+                };
+                truck.provenance.insert(path.clone(), origin);
+            }
             truck = truck.with_parameter(path, new.value).map_err(|e| match e {
                 DynamicsError::UnknownParameter { path, nearest, .. } => {
                     DynamicsError::UnknownParameter { name: overlay.name.clone(), path, nearest }

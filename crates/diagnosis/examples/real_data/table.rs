@@ -57,7 +57,8 @@ pub(crate) fn read(path: &Path) -> Outcome<RawTable> {
     Ok(RawTable { columns })
 }
 
-fn number(field: &str) -> f64 {
+/// A number or a time of day, s; NaN for anything else.
+pub(crate) fn number(field: &str) -> f64 {
     let parts: Vec<f64> = field.split(':').filter_map(|p| p.parse().ok()).collect();
     match parts.as_slice() {
         [h, m, s] => 3600.0 * h + 60.0 * m + s,

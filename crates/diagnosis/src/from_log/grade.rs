@@ -16,7 +16,7 @@ const GRADE_SD_FRAC: f64 = 0.03;
 
 /// Grade (rise over run) and its standard deviation at every row; rows are `step_m` of way apart and
 /// have an altitude, m, or `NaN`.
-pub(super) fn from_altitude(step_m: &[f64], altitude_m: &[f64]) -> Vec<(f64, f64)> {
+pub(crate) fn from_altitude(step_m: &[f64], altitude_m: &[f64]) -> Vec<(f64, f64)> {
     let known = altitude_m.iter().copied().find(|a| a.is_finite()).unwrap_or(0.0);
     let mut x = Vector2::new(known, 0.0);
     let mut p = Matrix2::new(1e4, 0.0, 0.0, GRADE_SD_FRAC * GRADE_SD_FRAC);

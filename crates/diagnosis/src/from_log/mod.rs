@@ -19,7 +19,7 @@ mod choose;
 mod collect;
 mod dbc;
 mod folder;
-mod grade;
+pub(crate) mod grade;
 mod observable;
 mod place;
 mod signals;

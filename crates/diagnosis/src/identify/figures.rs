@@ -1,7 +1,9 @@
 //! The figures that are asked for: which parameter of the replay stands for each, and how the truck
 //! file carries it.
 
-use dynamics::TruckParameters;
+use std::collections::BTreeMap;
+
+use dynamics::{Overlay, TruckParameters};
 
 use super::LOAD_SHEET_FRAC;
 use crate::Channel as C;
@@ -112,17 +114,25 @@ impl Figure {
     }
 }
 
+/// An overlay that changes nothing, to have a truck's figures checked.
+fn nothing(truck: &TruckParameters) -> Overlay {
+    let (base, set, table_effects) = Default::default();
+    Overlay { schema: 1, base, name: truck.name.clone(), set, table_effects }
+}
+
 /// A truck on its way, and the factors on its tables.
 #[derive(Debug, Clone)]
 pub(super) struct Standing {
     pub(super) truck: TruckParameters,
     full_load: f64,
     fuel: f64,
+    /// What drives asked for last and no truck has, by path.
+    pub(super) refused: BTreeMap<&'static str, f64>,
 }
 
 impl Standing {
     pub(super) fn new(truck: TruckParameters) -> Self {
-        Self { truck, full_load: 1.0, fuel: 1.0 }
+        Self { truck, full_load: 1.0, fuel: 1.0, refused: BTreeMap::new() }
     }
 
     /// The figure as it stands.
@@ -166,10 +176,16 @@ impl Standing {
         let before = self.truck.clone();
         for (f, size) in sizes {
             let carried = f.id.and_then(|id| overlay::figure(&before, id, f.p, *size));
-            if let Some((path, value)) = carried
-                && let Ok(truck) = self.truck.with_parameter(path, value)
-            {
-                self.truck = truck;
+            let Some((path, value)) = carried else { continue };
+            let truck = self.truck.with_parameter(path, value);
+            match truck.ok().filter(|t| t.with_overlay(&nothing(t)).is_ok()) {
+                Some(truck) => {
+                    self.truck = truck;
+                    self.refused.remove(path);
+                }
+                None => {
+                    self.refused.insert(path, value);
+                }
             }
         }
         let torque = of(P::TorqueScale).unwrap_or(1.0);

@@ -12,10 +12,17 @@
 //! and the noise is learned anew until nothing moves: noise learned beside a wrong truck is too large.
 //! A figure whose interval the drives hardly narrow stays as it is and says why.
 //!
+//! Coast-downs come first ([`coast_down`]): what they say of the road load is what the other drives
+//! begin with. Columns that a log lacks and others say are worked out ([`columns`]).
+//!
 //! Left out: forms (fuel map, full load: a factor on them), tyres when cold, wind of the region.
 
+mod coast_down;
+mod columns;
 mod figures;
 mod ratios;
+
+use std::borrow::Cow;
 
 use dynamics::TruckParameters;
 use serde::Serialize;
@@ -24,7 +31,7 @@ use crate::param::P;
 use crate::problem::Problem;
 use crate::refit::{Fit, Prior};
 use crate::replay::Prepared;
-use crate::{DiagnosisError, DriveSet, Executor, Plant, sentence};
+use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Plant, sentence};
 use figures::{FIGURES, Figure, Standing};
 
 /// Standard deviations on either side of the mean that hold 90 %.
@@ -58,6 +65,23 @@ pub struct Identified {
     pub prior_sigma: Option<f64>,
 }
 
+impl Identified {
+    /// What `[provenance]` says of it.
+    fn origin(&self, source: &str) -> dynamics::FigureOrigin {
+        dynamics::FigureOrigin {
+            known_by: dynamics::KnownBy::Drives,
+            sigma: (!self.is_factor).then_some(self.sigma),
+            interval_90: (!self.is_factor).then_some(self.interval_90),
+            source: if self.is_factor {
+                let [low, high] = self.interval_90;
+                format!("{source}; times {:.4} ({low:.4} to {high:.4})", self.value)
+            } else {
+                source.to_owned()
+            },
+        }
+    }
+}
+
 /// A figure that the drives do not tell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotTold {
@@ -89,6 +113,8 @@ pub struct Identification {
     pub correlated: Vec<Correlated>,
     /// Names of the drives.
     pub drives: Vec<String>,
+    /// Defects of the data, and columns that were worked out.
+    pub findings: Vec<Finding>,
 }
 
 /// Identifies the truck of `drives`, which must be in order, starting from a truck file.
@@ -101,8 +127,38 @@ pub fn identify(
     drives: &DriveSet,
     executor: &dyn Executor,
 ) -> Result<Identification, DiagnosisError> {
-    crate::plausible::check_length(drives)?;
-    let ratios = ratios::identify(truck, drives)?;
+    let road_load = coast_down::identify(truck, &drives.drives.iter().collect::<Vec<_>>())?;
+    let names = drives.drives.iter().map(|d| d.name.clone()).collect();
+    let (drives, findings) = driven(truck, drives);
+    let mut start = truck.clone();
+    let mut figures: Vec<Identified> = Vec::new();
+    let mut not_told = Vec::new();
+    if let Some(found) = road_load {
+        for f in &found.figures {
+            let bad = |e: dynamics::DynamicsError| DiagnosisError::Truck(e.to_string());
+            start = start.with_parameter(&f.path, f.value).map_err(bad)?;
+            start.provenance.insert(f.path.clone(), f.origin("coast-downs"));
+        }
+        (figures, not_told) = (found.figures, found.not_told);
+    }
+    if drives.drives.is_empty() {
+        not_told.extend(FIGURES.iter().map(|f| f.path(truck)).filter_map(|path| {
+            let told = figures.iter().any(|f| f.path == path);
+            let why = "no drive under power".to_owned();
+            (!told && !path.is_empty()).then(|| NotTold { path: path.to_owned(), why })
+        }));
+        let correlated = Vec::new();
+        return Ok(Identification {
+            truck: start,
+            figures,
+            not_told,
+            correlated,
+            drives: names,
+            findings,
+        });
+    }
+    crate::plausible::check_length(&drives)?;
+    let ratios = ratios::identify(&start, &drives)?;
     let mut standing = Standing::new(ratios.truck);
     let mut round = 0;
     let told = loop {
@@ -114,7 +170,7 @@ pub fn identify(
             FIGURES.iter().partition(|f| f.missing(&prepared).is_empty());
         let wanted = asked
             .iter()
-            .map(|f| (f.p, standing.prior(truck, f, weighed)))
+            .map(|f| (f.p, standing.prior(&start, f, weighed)))
             .collect::<Vec<(P, Prior)>>();
         let known: Vec<P> = asked.iter().map(|f| f.p).collect();
         let problem = Problem::learn_about(&plant, prepared, &known, executor)?;
@@ -137,7 +193,7 @@ pub fn identify(
         let before = standing.clone();
         standing.apply(&sizes);
         if moved < SETTLED || round == ROUNDS {
-            let missing = missing.iter().map(|f| not_told(truck, f, &problem.drives));
+            let missing = missing.iter().map(|f| lacks_channels(truck, f, &problem.drives));
             let mut not: Vec<NotTold> = missing.collect();
             not.extend((0..asked.len()).filter(|j| !is_told(*j)).map(|j| {
                 NotTold {
@@ -148,8 +204,13 @@ pub fn identify(
                         .to_owned(),
                 }
             }));
+            let refused = |j: usize| standing.refused.get(asked[j].path(truck)).copied();
+            not.extend((0..asked.len()).filter(|j| is_told(*j)).filter_map(|j| {
+                let why = format!("the drives ask for {:.4}, which no truck has", refused(j)?);
+                Some(NotTold { path: asked[j].path(truck).to_owned(), why })
+            }));
             let figures = (0..asked.len())
-                .filter(|j| is_told(*j))
+                .filter(|j| is_told(*j) && refused(*j).is_none())
                 .map(|j| {
                     let slope = before.slope(asked[j]);
                     let value = standing.value(asked[j]);
@@ -170,20 +231,42 @@ pub fn identify(
             break (figures, not, pairs);
         }
     };
-    let (fitted, mut not_told, correlated) = told;
-    let mut figures = ratios.figures;
-    figures.extend(fitted);
+    let (fitted, untold, correlated) = told;
+    let of = |path: &str| fitted.iter().any(|f| f.path == path);
+    figures.retain(|f| !of(&f.path));
+    figures.extend(ratios.figures);
+    figures.extend(fitted.iter().cloned());
+    not_told.extend(untold);
     not_told.extend(ratios.not_told);
+    not_told.retain(|n| !figures.iter().any(|f| f.path == n.path));
     Ok(Identification {
         truck: standing.truck,
         figures,
         not_told,
         correlated,
-        drives: drives.drives.iter().map(|d| d.name.clone()).collect(),
+        drives: names,
+        findings,
     })
 }
 
-fn not_told(truck: &TruckParameters, figure: &Figure, drives: &[Prepared]) -> NotTold {
+/// The drives that are no coast-downs, with columns that could be worked out, and all findings.
+fn driven<'a>(truck: &TruckParameters, set: &'a DriveSet) -> (Cow<'a, DriveSet>, Vec<Finding>) {
+    let mut findings = set.findings.clone();
+    let mut drives: Vec<Cow<'_, Drive>> = Vec::new();
+    for d in set.drives.iter().filter(|d| d.coast_down.is_none()) {
+        let (completed, said) = columns::completed(truck, d);
+        drives.push(completed.map_or(Cow::Borrowed(d), Cow::Owned));
+        findings.extend(said);
+    }
+    let as_it_is = drives.iter().all(|d| matches!(d, Cow::Borrowed(_)));
+    if as_it_is && drives.len() == set.drives.len() {
+        return (Cow::Borrowed(set), findings);
+    }
+    let drives = drives.into_iter().map(Cow::into_owned).collect();
+    (Cow::Owned(DriveSet { truck: set.truck.clone(), drives, findings: Vec::new() }), findings)
+}
+
+fn lacks_channels(truck: &TruckParameters, figure: &Figure, drives: &[Prepared]) -> NotTold {
     NotTold {
         path: figure.path(truck).to_owned(),
         why: format!("channels are missing: {}", figure.missing(drives).join(", ")),
@@ -233,18 +316,7 @@ impl Identification {
         let mut truck = self.truck.clone();
         truck.name = name.to_owned();
         for f in &self.figures {
-            let origin = dynamics::FigureOrigin {
-                known_by: dynamics::KnownBy::Drives,
-                sigma: (!f.is_factor).then_some(f.sigma),
-                interval_90: (!f.is_factor).then_some(f.interval_90),
-                source: if f.is_factor {
-                    let [low, high] = f.interval_90;
-                    format!("{source}; times {:.4} ({low:.4} to {high:.4})", f.value)
-                } else {
-                    source.to_owned()
-                },
-            };
-            truck.provenance.insert(f.path.clone(), origin);
+            truck.provenance.insert(f.path.clone(), f.origin(source));
         }
         let bad = |e: &dyn core::fmt::Display| DiagnosisError::Truck(e.to_string());
         let text = toml::to_string(&truck).map_err(|e| bad(&e))?;

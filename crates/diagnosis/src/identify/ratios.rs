@@ -154,8 +154,8 @@ fn wheels_over_satellites(d: &Drive) -> Option<f64> {
 }
 
 fn logs(d: &Drive, truck: &TruckParameters) -> Logs {
-    let (Some(speed), Some(rpm), Some(gear)) =
-        (d.get(C::SpeedMS), d.get(C::EngineSpeedRpm), d.get(C::Gear))
+    let gear = d.get(C::Gear).filter(|_| !d.gear_derived);
+    let (Some(speed), Some(rpm), Some(gear)) = (d.get(C::SpeedMS), d.get(C::EngineSpeedRpm), gear)
     else {
         return Logs::new();
     };

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tractrix_core::words::Short;
 
-use crate::drive::Drive;
+use crate::drive::{CoastDown, Drive};
 use crate::finding::{Action, Finding, FindingKind};
 use crate::{Channel, DiagnosisError};
 
@@ -12,6 +12,10 @@ use super::RawTable;
 
 /// Shortest drive that is read, s.
 const MIN_DRIVE_S: f64 = 60.0;
+/// Shortest coast-down that is read, s.
+const MIN_COAST_DOWN_S: f64 = 20.0;
+/// Most that two readings of a coast-down are apart, s.
+const SLOWEST_READING_S: f64 = 60.0;
 /// Longest drive that is read, s: a day.
 const LONGEST_DRIVE_S: f64 = 86_400.0;
 /// No log of a truck is as slow as this, s from row to row.
@@ -49,15 +53,14 @@ pub(super) fn to_grid(
     let keep = usable_rows(name, time, &mut note)?;
     let t: Vec<f64> = keep.iter().map(|&i| time[i]).collect();
     let seconds = t.last().unwrap_or(&0.0) - t.first().unwrap_or(&0.0);
-    if t.len() < 2 || seconds < MIN_DRIVE_S {
-        return Err(DiagnosisError::TooShort {
-            drive: name.to_owned(),
-            seconds,
-            needed_s: MIN_DRIVE_S,
-        });
+    let coasts = table.column("gear").is_some_and(|g| keep.iter().all(|&i| g.get(i) == Some(&0.0)));
+    let (needed_s, slowest_s) =
+        if coasts { (MIN_COAST_DOWN_S, SLOWEST_READING_S) } else { (MIN_DRIVE_S, SLOWEST_STEP_S) };
+    if t.len() < 2 || seconds < needed_s {
+        return Err(DiagnosisError::TooShort { drive: name.to_owned(), seconds, needed_s });
     }
     let typical_s = typical_step(&t);
-    in_seconds(path, typical_s, seconds)?;
+    in_seconds(path, typical_s, slowest_s, seconds)?;
     let len = (seconds / Drive::STEP_S + 1e-6).floor() as usize + 1;
     note_gaps(&t, typical_s, &mut note);
     let mut drive = Drive::new(name, t[0], len);
@@ -74,6 +77,9 @@ pub(super) fn to_grid(
         }
         let mut v: Vec<f64> = keep.iter().map(|&i| values[i]).collect();
         if clean(channel, &t, &mut v, &mut note) {
+            if coasts && channel == Channel::SpeedMS {
+                drive.coast_down = Some(readings(&t, &v, typical_s));
+            }
             drive.set(channel, resample(&t, &v, t[0], len, channel.is_discrete()));
         }
     }
@@ -135,9 +141,38 @@ fn typical_step(t: &[f64]) -> f64 {
     steps[steps.len() / 2]
 }
 
+/// Seconds over which a logger's samples of a coast-down make one reading: gusts last as long.
+const READING_S: f64 = 5.0;
+/// Standard deviation of such a reading, m/s.
+const READING_SIGMA_M_S: f64 = 0.03;
+
+/// The readings of a coast-down: its rows, or the means of a logger's.
+fn readings(t: &[f64], v: &[f64], step_s: f64) -> CoastDown {
+    let mut out = CoastDown {
+        time_s: Vec::new(),
+        speed_m_s: Vec::new(),
+        step_s,
+        time_sigma_s: 0.0,
+        speed_sigma_m_s: READING_SIGMA_M_S,
+    };
+    let first = t.first().copied().unwrap_or(0.0);
+    let rows: Vec<(f64, f64)> = t.iter().map(|t| t - first).zip(v.iter().copied()).collect();
+    for one in rows.chunk_by(|a, b| (a.0 / READING_S).floor() == (b.0 / READING_S).floor()) {
+        let mean = |of: fn(&(f64, f64)) -> f64| one.iter().map(of).sum::<f64>() / one.len() as f64;
+        out.time_s.push(mean(|r| r.0));
+        out.speed_m_s.push(mean(|r| r.1));
+    }
+    out
+}
+
 /// Refuses times that are not seconds, before they are laid on a grid of seconds.
-fn in_seconds(path: &Path, typical_s: f64, seconds: f64) -> Result<(), DiagnosisError> {
-    let what = if typical_s >= SLOWEST_STEP_S {
+fn in_seconds(
+    path: &Path,
+    typical_s: f64,
+    slowest_s: f64,
+    seconds: f64,
+) -> Result<(), DiagnosisError> {
+    let what = if typical_s >= slowest_s {
         format!("steps by {} from row to row", Short(typical_s))
     } else if seconds > LONGEST_DRIVE_S {
         format!(

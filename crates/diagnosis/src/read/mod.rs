@@ -11,6 +11,9 @@ use crate::drive::RoadMap;
 use crate::index::{Entry, INDEX, Index};
 use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Serial, Trace, collect};
 
+/// Standard deviations that the index may name for the readings of a coast-down, s and m/s.
+const MOST_SIGMA: core::ops::RangeInclusive<f64> = 1e-3..=5.0;
+
 /// Columns of one file by name, as written, `NaN` where a value is missing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RawTable {
@@ -130,6 +133,24 @@ fn read_drive(
         drive.reported_mass_kg = Some(m);
     }
     drive.tyres_warm_at_start = entry.tyres_warm_at_start;
+    for (key, sigma) in
+        [("time_sigma_s", entry.time_sigma_s), ("speed_sigma_m_s", entry.speed_sigma_m_s)]
+    {
+        let Some(sigma) = sigma else { continue };
+        let Some(readings) = &mut drive.coast_down else {
+            let why = "is for a coast-down, and gear is not 0 from begin to end";
+            return Err(bad(format!("drive {}: {key} {why}", entry.name)));
+        };
+        if !MOST_SIGMA.contains(&sigma) {
+            return Err(bad(format!("drive {}: {key} = {sigma}", entry.name)));
+        }
+        let known = if key == "time_sigma_s" {
+            &mut readings.time_sigma_s
+        } else {
+            &mut readings.speed_sigma_m_s
+        };
+        *known = sigma;
+    }
     if let Some(map) = &entry.map {
         drive.map = Some(road_map(&dir.join(map))?);
         grid::fill_from_map(&mut drive);

@@ -7,6 +7,9 @@ use tractrix_core::ZERO_DEGC_K;
 use super::prepared::Prepared;
 use crate::Plant;
 
+/// Speed below which a measured ratio says nothing, m/s.
+const LEAST_M_S: f64 = 1.0;
+
 /// Samples that are computed side by side.
 pub(super) const BLOCK: usize = 64;
 
@@ -46,13 +49,21 @@ impl Inputs {
     pub(super) fn new(d: &Prepared, plant: &Plant) -> Self {
         let (engine, truck) = (&plant.engine, &plant.truck);
         let driveline = &truck.driveline;
+        let measured = |i: usize| {
+            let ratio_1_m = d.turning[i] / d.speed[i].max(LEAST_M_S);
+            let wheel_kg = driveline.rotating_mass_kg(0.0, 0);
+            (ratio_1_m, wheel_kg + truck.engine.inertia_kg_m2 * ratio_1_m * ratio_1_m)
+        };
         let per_gear: Vec<(f64, f64)> = (0..=driveline.gear_ratios.len() as u8)
             .map(|g| {
                 let rotating_kg = driveline.rotating_mass_kg(truck.engine.inertia_kg_m2, g);
                 (driveline.total_ratio(g) / driveline.wheel_radius_m, rotating_kg)
             })
             .collect();
-        let gear = |i: usize| per_gear[if d.gear[i] < per_gear.len() { d.gear[i] } else { 0 }];
+        let gear = |i: usize| match d.measured_ratio {
+            true => measured(i),
+            false => per_gear[if d.gear[i] < per_gear.len() { d.gear[i] } else { 0 }],
+        };
         let holding = induced_n(d, plant);
         let padded = d.n.next_multiple_of(BLOCK);
         let of = |f: &dyn Fn(usize) -> f64| -> Vec<f64> { pad((0..d.n).map(f), padded) };

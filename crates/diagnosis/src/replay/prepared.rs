@@ -1,5 +1,6 @@
 //! A drive made ready for replay: channels with defaults, air density, masks per module.
 
+use dynamics::effects::driveline::RELEASED_PEDAL_FRAC;
 use dynamics::effects::resistance::air_density_kg_m3;
 use dynamics::effects::table::TableSignal;
 use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
@@ -58,6 +59,10 @@ pub(crate) struct Prepared {
     pub(super) full_load: Vec<f64>,
     pub(super) balance: Inputs,
     pub(super) profiles: Profiles,
+    /// The ratio of the driveline is that of engine and road speed: nobody logged the gear.
+    pub(super) measured_ratio: bool,
+    /// A logged coast-down: nothing but the road load acts.
+    pub(crate) coasts: bool,
     /// Closed driveline without a shift near, per sample.
     pub(crate) engaged: Vec<bool>,
     /// Shifts as (first sample, number of samples).
@@ -112,7 +117,7 @@ impl GradeBySection {
 /// Indicated torque up to which a message of 1 % a bit with its noise may be zero, percent of the
 /// reference torque: what burns no more than this is not judged.
 const CUT_OFF_PERCENT: f64 = 2.5;
-/// Torque above which nobody brakes, percent, and samples until brakes that were on are off.
+/// Torque above which nobody brakes who has a foot on the accelerator, percent, and samples until brakes that were on are off.
 const PULLS: f64 = 3.0;
 const RELEASE: i32 = 30;
 
@@ -122,6 +127,15 @@ const LEAST_FUEL_G_S: f64 = 0.2;
 /// Samples after which a pressure that rests under a demand that rests says nothing new: a truck
 /// that is held for an hour repeats the rounding of one message.
 const RESTS: usize = 20;
+
+/// Without a gear, a driveline counts from this engine speed over idling and this speed on, m/s, where
+/// their ratio changes by less than a part in the margin of a shift.
+const OVER_IDLE: f64 = 1.15;
+const LEAST_M_S: f64 = 2.5;
+const RESTS_FRAC: f64 = 0.03;
+
+/// Rows of a logged coast-down are no further apart, s.
+const LOGGED_S: f64 = 1.0;
 
 /// Samples kept away from a shift on either side.
 const SHIFT_MARGIN: usize = 12;
@@ -161,7 +175,11 @@ impl Prepared {
         let gear: Vec<usize> = get(C::Gear, 0.0).iter().map(|g| g.max(0.0) as usize).collect();
         let shifting: Vec<bool> = get(C::ShiftInProcess, 0.0).iter().map(|s| *s > 0.5).collect();
         let shifts = runs(&shifting);
-        let engaged = engaged(plant, &speed, &rpm, &gear, &shifting);
+        let engaged = if drive.gear_derived {
+            steady_ratio(plant, &speed, &rpm)
+        } else {
+            engaged(plant, &speed, &rpm, &gear, &shifting)
+        };
         let mut heading = get(C::HeadingRad, 0.0);
         unwrap(&mut heading);
         let mut d = Self {
@@ -208,6 +226,8 @@ impl Prepared {
             density,
             grade,
             s_map,
+            measured_ratio: drive.gear_derived,
+            coasts: drive.coast_down.as_ref().is_some_and(|c| c.step_s <= LOGGED_S),
             engaged,
             shifts,
             valid: Default::default(),
@@ -297,10 +317,13 @@ impl Prepared {
         let unseen = !self.has(&[C::BrakePressureKpa]);
         let demanded = unseen && self.has(&[C::XbrDecelMS2]);
         let coasting = unseen && !demanded || !self.has(&[C::EngineBrakeFrac]);
+        let released = self.has(&[C::AcceleratorPedalFrac]);
         let mut left = 0;
         (0..self.n)
             .map(|i| {
-                let held = demanded && self.xbr[i] > 0.0 || coasting && self.torque[i] < PULLS;
+                let pulls =
+                    self.torque[i] >= PULLS && !(released && self.pedal[i] < RELEASED_PEDAL_FRAC);
+                let held = demanded && self.xbr[i] > 0.0 || coasting && !pulls;
                 left = if held { RELEASE } else { (left - 1).max(0) };
                 left > 0
             })
@@ -316,12 +339,11 @@ impl Prepared {
         let seconds =
             |m: M, ok: &dyn Fn(usize) -> bool| rows(m, &|a, b| (a..(b + 4).min(n)).all(ok));
         let mut valid: [Vec<bool>; MODULES] = Default::default();
-        let longitudinal = self.has(&[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear])
-            && self.has(&[C::GradeFrac]);
-        if longitudinal {
+        let pulled = self.has(&[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear]);
+        if (pulled || self.coasts) && self.has(&[C::GradeFrac]) {
             let held = self.may_be_held();
-            valid[M::Force as usize] =
-                seconds(M::Force, &|i| self.engaged[i] && self.speed[i] > 3.0 && !held[i]);
+            let rolls = |i: usize| self.coasts || self.engaged[i] && !held[i];
+            valid[M::Force as usize] = seconds(M::Force, &|i| rolls(i) && self.speed[i] > 3.0);
         }
         if self.has(&[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm]) {
             let idle = plant.truck.engine.idle_speed_rpm + 80.0;
@@ -442,6 +464,24 @@ fn engaged(
             let in_gear = |g| plant.truck.driveline.engine_speed_rad_s(speed[i], g);
             let expected = u8::try_from(gear[i]).map_or(0.0, in_gear) * RPM_PER_RAD_S;
             expected != 0.0 && !near[i] && (rpm[i] - expected).abs() < 60.0 + 0.08 * expected
+        })
+        .collect()
+}
+
+/// Where no gear was logged: the engine pulls or is turned, and engine over road speed rests over the
+/// margins of a shift, as it does in a gear whether or not a converter slips.
+fn steady_ratio(plant: &Plant, speed: &[f64], rpm: &[f64]) -> Vec<bool> {
+    let idle = plant.truck.engine.idle_speed_rpm;
+    let ratio = |i: usize| {
+        let turns = rpm[i] > OVER_IDLE * idle && speed[i] > LEAST_M_S;
+        turns.then(|| (rpm[i] / speed[i]).ln())
+    };
+    let last = speed.len().saturating_sub(1);
+    let around = |i: usize| [i.saturating_sub(SHIFT_MARGIN), i, (i + SHIFT_MARGIN).min(last)];
+    (0..speed.len())
+        .map(|i| {
+            let [Some(before), Some(now), Some(after)] = around(i).map(ratio) else { return false };
+            (now - before).abs() < RESTS_FRAC && (after - now).abs() < RESTS_FRAC
         })
         .collect()
 }

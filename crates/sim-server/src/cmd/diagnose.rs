@@ -18,6 +18,8 @@ mod recorded;
 mod report;
 mod results;
 
+pub(super) use results::defects;
+
 use results::Results;
 
 /// Finds what the simulation gets wrong on measured drives and names the cause. Writes

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Parser;
-use diagnosis::Threads;
 use diagnosis::identify::{Correlated, Identification, Identified, NotTold, identify};
+use diagnosis::{Finding, Threads};
 use dynamics::TruckParameters;
 use serde::Serialize;
 
@@ -49,6 +49,7 @@ struct Report<'a> {
     figures: &'a [Identified],
     not_told: &'a [NotTold],
     correlated: &'a [Correlated],
+    findings: &'a [Finding],
 }
 
 /// Runs the command.
@@ -76,6 +77,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         figures: &found.figures,
         not_told: &found.not_told,
         correlated: &found.correlated,
+        findings: &found.findings,
     };
     let text = serde_json::to_string_pretty(&report).map_err(Failure::work)?;
     out.write("identify.json", &text)?;
@@ -111,6 +113,7 @@ fn sentences(found: &Identification, file: &str) -> String {
         let [a, b] = &pair.figures;
         lines.push(format!("  {a} and {b} move together ({:+.2})", pair.correlation));
     }
+    lines.extend(super::diagnose::defects(&found.findings));
     lines.push(format!("Truck file: {file}"));
     lines.join("\n")
 }

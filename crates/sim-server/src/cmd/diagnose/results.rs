@@ -134,7 +134,7 @@ impl Results {
 }
 
 /// Defects of the data, a line each up to [`MOST_DEFECTS`], the rest counted.
-fn defects(findings: &[Finding]) -> Vec<String> {
+pub(in crate::cmd) fn defects(findings: &[Finding]) -> Vec<String> {
     let of = |f: &Finding| {
         let channel = f.channel.as_ref().map_or_else(String::new, |c| format!(", {c}"));
         let at = f.time_s.map_or_else(String::new, |t| format!(" at {t:.1} s"));
