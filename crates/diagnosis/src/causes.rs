@@ -64,7 +64,7 @@ impl Compared<'_> {
         };
         let own = |s: &Shape| {
             let sizes = CATALOGUE[self.fit.set[i]].sizes.iter();
-            s.memory_s == 0.0 && sizes.flat_map(|p| signals(*p)).any(|x| *x == s.signal)
+            s.memory_s == 0.0 && sizes.flat_map(|p| signals(*p)).any(|x| x.0 == s.signal)
         };
         let part = |s: &&Shape| matches!(s.acts, Acts::Part(_)) && shows(self.fit.set[i], s.module);
         for s in found.iter().filter(part).filter(|s| !own(s)) {

@@ -13,8 +13,10 @@
 //! would patch of the form of a large one is explained without it, and a size is known no better
 //! than its form.
 
+use dynamics::catalogue::Law;
 use nalgebra::{DMatrix, DVector};
 
+use crate::hypothesis::{Along, CATALOGUE, Hypothesis};
 use crate::param::{P, Theta};
 use crate::problem::{Direction, Gram, Hat};
 use crate::refit::{Fit, directions};
@@ -29,68 +31,20 @@ const RHO: f64 = 0.05;
 /// fitted: form and course would be free of each other.
 const RHO_SHAPE: f64 = 0.25;
 
-/// Standard deviation of the course of a cause with this size along one of its [`signals`].
-fn rho(p: P, signal: &str) -> f64 {
-    match (p, signal) {
-        // The form along these is fitted: onset and slope, threshold and hysteresis, knee.
-        (P::FanPower | P::HeatCoolant, "coolant_temp_degc")
-        | (P::Altitude, "gps_altitude_m")
-        | (P::HeatAir, "ambient_temp_degc")
-        | (P::FuelLow, "engine_torque_percent") => RHO,
-        (
-            P::FanPower
-            | P::Friction
-            | P::EngineBrakeScale
-            | P::Altitude
-            | P::HeatAir
-            | P::HeatCoolant
-            | P::TurboLag
-            | P::PedalDelay
-            | P::ShiftTime
-            | P::FuelLow
-            | P::BrakeDelay
-            | P::Fade
-            | P::RetarderStage
-            | P::RetarderBrake
-            | P::RetarderCoast
-            | P::FreePlay
-            | P::SteerLag,
-            _,
-        ) => RHO_SHAPE,
-        _ => RHO,
-    }
-}
-
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
 
-/// Signals along which the course of a cause with this size may differ: those that drive it.
-pub(crate) fn signals(p: P) -> &'static [&'static str] {
-    match p {
-        P::Rolling => &["speed_m_s", "time_s"],
-        // The law of speed is what tells these apart.
-        P::Drag | P::Headwind | P::DragBrake => &["time_s"],
-        P::Mass => &["grade_frac", "accel_y_m_s2"],
-        P::GradeBias => &["grade_frac"],
-        P::WindX | P::WindY | P::Crosswind | P::MapShift | P::WarmupAmp => &["time_s"],
-        P::SteerOffset | P::YawBias | P::SteerRatio | P::SpeedScale => &["time_s"],
-        P::DrivelineLoss => &["engine_torque_percent"],
-        P::FanPower => &["engine_speed_rpm", "coolant_temp_degc"],
-        P::Friction | P::PedalDelay | P::TurboLag | P::EngineBrakeScale => &["engine_speed_rpm"],
-        P::Altitude => &["gps_altitude_m", "engine_speed_rpm"],
-        P::HeatAir => &["ambient_temp_degc", "engine_speed_rpm"],
-        P::HeatCoolant => &["coolant_temp_degc", "engine_speed_rpm"],
-        P::ShiftTime => &["gear", "engine_speed_rpm"],
-        P::FuelLow => &["engine_speed_rpm", "engine_torque_percent"],
-        P::BrakeGain | P::BrakeDelay => &["brake_pressure_kpa"],
-        P::Fade => &["speed_m_s", "brake_pressure_kpa"],
-        P::RetarderStage | P::RetarderBrake | P::RetarderCoast => &["speed_m_s", "time_s"],
-        P::FreePlay | P::SteerLag | P::PayloadX => &["speed_m_s"],
-        P::CFront | P::CDrive | P::CTrailer => &["speed_m_s", "accel_y_m_s2"],
-        P::Bank => &["curvature_1_m"],
-        P::FuelFlow => &["engine_speed_rpm", "time_s"],
-        P::Co2Scale => &["time_s"],
-        _ => &[],
+/// Signals along which the course of a cause with this size may differ, those that drive it, and its
+/// standard deviation there.
+pub(crate) fn signals(p: P) -> impl Iterator<Item = (&'static str, f64)> {
+    let own = CATALOGUE.iter().find(|h| h.sizes.contains(&p));
+    own.into_iter().flat_map(|h| h.course.iter().map(|along| (along.signal(), rho(h, along))))
+}
+
+fn rho(h: &Hypothesis, along: &Along) -> f64 {
+    match (h.of_truck().map(|c| c.law), along) {
+        (Some(Law::Chosen), Along::Open(_)) => RHO_SHAPE,
+        _ => RHO,
     }
 }
 
@@ -118,14 +72,14 @@ impl Course {
                 continue;
             }
             let mut hats = Vec::new();
-            for name in signals(p) {
+            for (name, rho) in signals(p) {
                 let Some(signal) = signal(name) else { continue };
                 let first = directions.len() + 1;
                 for knot in 0..HATS {
                     let hat = Some(Hat { signal, knot });
                     directions.push(Direction { hat, ..directions[j].clone() });
                 }
-                hats.push((rho(p, name), (first..first + HATS).collect()));
+                hats.push((rho, (first..first + HATS).collect()));
             }
             out.push(Effect { p, column: j + 1, hats });
         }
@@ -277,5 +231,33 @@ impl Gram {
     pub(crate) fn total(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
         let (a, b, norm) = self.sum(|_| true);
         (a, b, norm + self.log_det)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The truck model's catalogue says who gives a cause's law; the courses follow it, but for the
+    /// signals over which a form is fitted.
+    #[test]
+    fn a_course_is_as_wide_as_the_catalogue_says_of_its_causes_law() {
+        let (mut broad, mut fitted) = (0, 0);
+        for h in CATALOGUE {
+            let law = h.of_truck().unwrap().law;
+            let along: Vec<f64> = h.sizes.iter().flat_map(|p| signals(*p)).map(|s| s.1).collect();
+            match law {
+                Law::Physics => assert!(along.iter().all(|rho| *rho == RHO), "{}", h.id),
+                Law::Chosen => assert!(along.contains(&RHO_SHAPE), "{}", h.id),
+            }
+            broad += usize::from(law == Law::Chosen);
+            for along in h.course {
+                assert!(signal(along.signal()).is_some(), "{}: {}", h.id, along.signal());
+                fitted += usize::from(matches!(along, Along::Fitted(_)));
+                // what is fitted needs a form
+                assert!(matches!(along, Along::Open(_)) || !h.shapes.is_empty(), "{}", h.id);
+            }
+        }
+        assert!(broad >= 15 && fitted >= 5, "{broad} {fitted}");
     }
 }

@@ -20,6 +20,29 @@ pub(crate) struct Hypothesis {
     pub(crate) min_size: f64,
     /// Sign that the size must have; 0: either.
     pub(crate) sign: f64,
+    /// What its course may differ along from the catalogue's: signals that drive it, but not the law
+    /// that tells it from others.
+    pub(crate) course: &'static [Along],
+}
+
+/// A measured signal along which the course of a cause may differ from the catalogue's.
+pub(crate) enum Along {
+    /// As widely as its law is open.
+    Open(&'static str),
+    /// Its form is fitted over it (onset and slope, threshold and hysteresis, knee): with a wide course
+    /// beside it the two would be free of each other.
+    Fitted(&'static str),
+}
+
+use Along::{Fitted, Open};
+
+impl Along {
+    /// The column.
+    pub(crate) fn signal(&self) -> &'static str {
+        match self {
+            Open(name) | Fitted(name) => name,
+        }
+    }
 }
 
 const LONG: &[C] = &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac];
@@ -43,14 +66,21 @@ const fn h(
     min_size: f64,
     sign: f64,
 ) -> Hypothesis {
-    Hypothesis { id, sizes, shapes, starts, channels, min_size, sign }
+    Hypothesis { id, sizes, shapes, starts, channels, min_size, sign, course: &[] }
+}
+
+impl Hypothesis {
+    const fn along(self, course: &'static [Along]) -> Self {
+        Self { course, ..self }
+    }
 }
 
 /// All hypotheses.
 pub(crate) const CATALOGUE: &[Hypothesis] = &[
-    h("rolling_resistance", &[P::Rolling], &[], ONE, LONG, 0.06, 0.0),
-    h("air_drag", &[P::Drag], &[], ONE, LONG, 0.05, 0.0),
-    h("headwind", &[P::Headwind], &[], ONE, LONG, 0.8, 0.0),
+    h("rolling_resistance", &[P::Rolling], &[], ONE, LONG, 0.06, 0.0)
+        .along(&[Open("speed_m_s"), Open("time_s")]),
+    h("air_drag", &[P::Drag], &[], ONE, LONG, 0.05, 0.0).along(&[Open("time_s")]),
+    h("headwind", &[P::Headwind], &[], ONE, LONG, 0.8, 0.0).along(&[Open("time_s")]),
     h(
         "wind",
         &[P::WindX, P::WindY],
@@ -59,10 +89,14 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::HeadingRad],
         2.0,
         0.0,
-    ),
-    h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0),
-    h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0),
-    h("map_shift", &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0),
+    )
+    .along(&[Open("time_s")]),
+    h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0)
+        .along(&[Open("grade_frac"), Open("accel_y_m_s2")]),
+    h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0)
+        .along(&[Open("grade_frac")]),
+    h("map_shift", &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0)
+        .along(&[Open("time_s")]),
     h(
         "tyre_warmup",
         &[P::WarmupAmp],
@@ -71,8 +105,10 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         LONG,
         0.1,
         1.0,
-    ),
-    h("driveline_loss", &[P::DrivelineLoss], &[], ONE, LONG, 0.01, 0.0),
+    )
+    .along(&[Open("time_s")]),
+    h("driveline_loss", &[P::DrivelineLoss], &[], ONE, LONG, 0.01, 0.0)
+        .along(&[Open("engine_torque_percent")]),
     h(
         "fan_load",
         &[P::FanPower],
@@ -90,9 +126,11 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::CoolantTempDegc],
         6.0,
         1.0,
-    ),
-    h("dragging_brake", &[P::DragBrake], &[], ONE, LONG, 150.0, 1.0),
-    h("engine_friction", &[P::Friction], &[], ONE, LONG, 0.1, 0.0),
+    )
+    .along(&[Open("engine_speed_rpm"), Fitted("coolant_temp_degc")]),
+    h("dragging_brake", &[P::DragBrake], &[], ONE, LONG, 150.0, 1.0).along(&[Open("time_s")]),
+    h("engine_friction", &[P::Friction], &[], ONE, LONG, 0.1, 0.0)
+        .along(&[Open("engine_speed_rpm")]),
     h(
         "altitude_derate",
         &[P::Altitude],
@@ -101,7 +139,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::GpsAltitudeM],
         0.015,
         1.0,
-    ),
+    )
+    .along(&[Fitted("gps_altitude_m"), Open("engine_speed_rpm")]),
     h(
         "heat_derate",
         &[P::HeatAir],
@@ -110,7 +149,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::AmbientTempDegc],
         0.01,
         1.0,
-    ),
+    )
+    .along(&[Fitted("ambient_temp_degc"), Open("engine_speed_rpm")]),
     h(
         "heat_derate",
         &[P::HeatCoolant],
@@ -119,7 +159,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::CoolantTempDegc],
         0.01,
         1.0,
-    ),
+    )
+    .along(&[Fitted("coolant_temp_degc"), Open("engine_speed_rpm")]),
     h(
         "turbo_lag",
         &[P::TurboLag],
@@ -128,7 +169,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm],
         0.08,
         0.0,
-    ),
+    )
+    .along(&[Open("engine_speed_rpm")]),
     h(
         "pedal_delay",
         &[P::PedalDelay],
@@ -137,8 +179,10 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm],
         0.03,
         0.0,
-    ),
-    h("shift_duration", &[P::ShiftTime], &[], ONE, &[C::ShiftInProcess], 0.08, 0.0),
+    )
+    .along(&[Open("engine_speed_rpm")]),
+    h("shift_duration", &[P::ShiftTime], &[], ONE, &[C::ShiftInProcess], 0.08, 0.0)
+        .along(&[Open("gear"), Open("engine_speed_rpm")]),
     h(
         "fuel_map_low_load",
         &[P::FuelLow],
@@ -157,7 +201,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm],
         0.04,
         0.0,
-    ),
+    )
+    .along(&[Open("engine_speed_rpm"), Fitted("engine_torque_percent")]),
     h(
         "brake_gain",
         &[P::BrakeGain],
@@ -166,7 +211,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::BrakePressureKpa],
         0.05,
         0.0,
-    ),
+    )
+    .along(&[Open("brake_pressure_kpa")]),
     h(
         "brake_fade",
         &[P::Fade],
@@ -175,8 +221,10 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::BrakePressureKpa],
         0.05,
         1.0,
-    ),
-    h("brake_delay", &[P::BrakeDelay], &[], ONE, &[C::XbrDecelMS2, C::BrakePressureKpa], 0.04, 0.0),
+    )
+    .along(&[Open("speed_m_s"), Open("brake_pressure_kpa")]),
+    h("brake_delay", &[P::BrakeDelay], &[], ONE, &[C::XbrDecelMS2, C::BrakePressureKpa], 0.04, 0.0)
+        .along(&[Open("brake_pressure_kpa")]),
     h(
         "hidden_retarder",
         &[P::RetarderStage],
@@ -185,7 +233,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::EngineBrakeFrac],
         150.0,
         1.0,
-    ),
+    )
+    .along(&[Open("speed_m_s"), Open("time_s")]),
     h(
         "hidden_retarder",
         &[P::RetarderBrake],
@@ -194,7 +243,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::XbrDecelMS2],
         600.0,
         1.0,
-    ),
+    )
+    .along(&[Open("speed_m_s"), Open("time_s")]),
     h(
         "hidden_retarder",
         &[P::RetarderCoast],
@@ -209,8 +259,10 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         ],
         100.0,
         1.0,
-    ),
-    h("speed_scale", &[P::SpeedScale], &[], ONE, &[C::GpsSpeedMS], 0.004, 0.0),
+    )
+    .along(&[Open("speed_m_s"), Open("time_s")]),
+    h("speed_scale", &[P::SpeedScale], &[], ONE, &[C::GpsSpeedMS], 0.004, 0.0)
+        .along(&[Open("time_s")]),
     h(
         "yaw_rate_bias",
         &[P::YawBias],
@@ -219,7 +271,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::YawRateRadS, C::SteeringWheelRad],
         0.0008,
         0.0,
-    ),
+    )
+    .along(&[Open("time_s")]),
     h(
         "steering_ratio",
         &[P::SteerRatio],
@@ -228,7 +281,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.02,
         0.0,
-    ),
+    )
+    .along(&[Open("time_s")]),
     h(
         "steering_offset",
         &[P::SteerOffset],
@@ -237,7 +291,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.015,
         0.0,
-    ),
+    )
+    .along(&[Open("time_s")]),
     h(
         "steering_free_play",
         &[P::FreePlay],
@@ -246,7 +301,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.015,
         1.0,
-    ),
+    )
+    .along(&[Open("speed_m_s")]),
     h(
         "steering_lag",
         &[P::SteerLag],
@@ -255,7 +311,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.03,
         0.0,
-    ),
+    )
+    .along(&[Open("speed_m_s")]),
     h(
         "cornering_stiffness_front",
         &[P::CFront],
@@ -264,7 +321,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.05,
         0.0,
-    ),
+    )
+    .along(&[Open("speed_m_s"), Open("accel_y_m_s2")]),
     h(
         "cornering_stiffness_drive",
         &[P::CDrive],
@@ -273,7 +331,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.05,
         0.0,
-    ),
+    )
+    .along(&[Open("speed_m_s"), Open("accel_y_m_s2")]),
     h(
         "cornering_stiffness_trailer",
         &[P::CTrailer],
@@ -282,7 +341,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::TrailerYawRateRadS],
         0.05,
         0.0,
-    ),
+    )
+    .along(&[Open("speed_m_s"), Open("accel_y_m_s2")]),
     h(
         "payload_position",
         &[P::PayloadX],
@@ -291,7 +351,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.15,
         0.0,
-    ),
+    )
+    .along(&[Open("speed_m_s")]),
     h(
         "road_bank",
         &[P::Bank],
@@ -300,7 +361,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS, C::AccelYMS2],
         0.003,
         0.0,
-    ),
+    )
+    .along(&[Open("curvature_1_m")]),
     h(
         "engine_brake_torque",
         &[P::EngineBrakeScale],
@@ -309,7 +371,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::EngineBrakeFrac],
         0.06,
         0.0,
-    ),
+    )
+    .along(&[Open("engine_speed_rpm")]),
     h(
         "crosswind",
         &[P::Crosswind],
@@ -318,9 +381,12 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[C::SteeringWheelRad, C::YawRateRadS],
         1.0,
         0.0,
-    ),
-    h("fuel_flow_scale", &[P::FuelFlow], &[P::FuelFlowPower], RATES, METERS, 0.02, 0.0),
-    h("co2_scale", &[P::Co2Scale], &[P::Co2Power], RATES, METERS, 0.03, 0.0),
+    )
+    .along(&[Open("time_s")]),
+    h("fuel_flow_scale", &[P::FuelFlow], &[P::FuelFlowPower], RATES, METERS, 0.02, 0.0)
+        .along(&[Open("engine_speed_rpm"), Open("time_s")]),
+    h("co2_scale", &[P::Co2Scale], &[P::Co2Power], RATES, METERS, 0.03, 0.0)
+        .along(&[Open("time_s")]),
 ];
 
 impl Hypothesis {
