@@ -10,14 +10,14 @@ use dynamics::effects::instruments::scale_at_rate;
 
 use super::Module as M;
 use super::prepared::Prepared;
+use crate::Plant;
 use crate::param::{P, Theta};
-use crate::{Drive, Plant};
 
 /// Samples of a row.
 pub(super) const WINDOW: usize = 300;
-/// How much later than the fuel rate the CO2 is measured, s: a second or two for exhaust, tunnel and
-/// analyser, which a laboratory's time alignment leaves.
-const TRANSPORT_S: f64 = 1.5;
+/// How much later than the fuel rate the CO2 may be measured, samples: two seconds for exhaust, tunnel
+/// and analyser, which a laboratory's time alignment leaves.
+pub(super) const TRANSPORT: usize = 40;
 /// Noise of a row's mean: a constant part, g/s, and a part of the rate.
 const NOISE: (f64, f64) = (0.1, 0.01);
 /// Newton steps from a reported fuel rate to the true one, which its error follows.
@@ -58,23 +58,26 @@ fn true_rate(reported: f64, error_frac: f64, exponent: f64) -> f64 {
 }
 
 /// Noise of the CO2 rate per row, g/s: what the instrument has, and what its delay makes of a fuel
-/// rate that is another at the row's end than at its begin.
+/// rate that was another before the row than before its end.
 pub(super) fn noise_g_s(co2_g_s: &[f64], fuel_g_s: &[f64]) -> Vec<f64> {
-    const EDGE: usize = 40;
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
-    let of = |(co2, fuel): (&[f64], &[f64])| {
-        let ends = fuel.get(..EDGE).zip(fuel.len().checked_sub(EDGE).and_then(|k| fuel.get(k..)));
-        let change_g_s = ends.map_or(0.0, |(begin, end)| mean(end) - mean(begin));
-        let late = CO2_PER_FUEL * change_g_s * TRANSPORT_S / (WINDOW as f64 * Drive::STEP_S);
+    let before = |end: usize| {
+        let end = end.min(fuel_g_s.len());
+        fuel_g_s.get(end.saturating_sub(TRANSPORT)..end).map_or(0.0, mean)
+    };
+    let of = |(k, co2): (usize, &[f64])| {
+        let change_g_s = before((k + 1) * WINDOW) - before(k * WINDOW);
+        let late = CO2_PER_FUEL * change_g_s * TRANSPORT as f64 / WINDOW as f64;
         (NOISE.0 + NOISE.1 * mean(co2).max(0.0)).hypot(late)
     };
-    co2_g_s.chunks(WINDOW).zip(fuel_g_s.chunks(WINDOW)).map(of).collect()
+    co2_g_s.chunks(WINDOW).enumerate().map(of).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::Channel as C;
+    use crate::Drive;
     use crate::param::PARAMS;
     use dynamics::TruckParameters;
 

@@ -5,6 +5,7 @@ use dynamics::effects::resistance::air_density_kg_m3;
 use dynamics::effects::table::TableSignal;
 use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
+use super::co2;
 use super::inputs::Inputs;
 use super::profiles::Profiles;
 use super::smooth;
@@ -213,7 +214,7 @@ impl Prepared {
             curvature: get(C::Curvature1M, 0.0),
             grade_by_s: GradeBySection::new(&s_map, &grade),
             fuel_noise_g_s: super::powertrain::noise_g_s(&get(C::FuelRateGS, 0.0)),
-            co2_noise_g_s: super::co2::noise_g_s(&get(C::Co2RateGS, 0.0), &get(C::FuelRateGS, 0.0)),
+            co2_noise_g_s: co2::noise_g_s(&get(C::Co2RateGS, 0.0), &get(C::FuelRateGS, 0.0)),
             full_load,
             omega,
             turning,
@@ -416,9 +417,10 @@ impl Prepared {
             valid[M::Imu as usize] = seconds(M::Imu, &|i| self.speed[i] > 3.0);
         }
         if self.has(&[C::FuelRateGS, C::Co2RateGS]) {
-            // An engine that stands still has no ratio.
+            // An engine that stands still has no ratio, and what is measured first was burnt before
+            // the log.
             let burns = |i: usize| self.fuel[i] > LEAST_FUEL_G_S;
-            valid[M::Co2 as usize] = rows(M::Co2, &|a, b| (a..b).all(burns));
+            valid[M::Co2 as usize] = rows(M::Co2, &|a, b| a >= co2::TRANSPORT && (a..b).all(burns));
         }
         for (a, v) in self.available.iter_mut().zip(&valid) {
             *a = v.iter().filter(|x| **x).count() >= 8;
