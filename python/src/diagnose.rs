@@ -2,13 +2,14 @@
 
 use std::path::{Path, PathBuf};
 
-use diagnosis::{DiagnosisError, Options, Request, Threads, read_drives_with};
+use diagnosis::{DiagnosisError, Options, Request, read_drives_with};
 use dynamics::TruckParameters;
 use pyo3::{Python, pyfunction};
 use sim::SimError;
 
 use crate::fault::Fault;
 use crate::provenance;
+use crate::threads::Threads;
 
 /// The text of `diagnosis.json`; with `out`, also the files there.
 #[pyfunction]

@@ -17,6 +17,8 @@ mod plan;
 mod policy;
 mod scenario;
 mod scene;
+#[path = "../../crates/sim-server/src/threads.rs"]
+mod threads;
 mod truck_model;
 mod world;
 

@@ -1,23 +1,21 @@
 //! The diagnosis as a whole: drives in, [`Diagnosis`] out.
 
+use crate::baseline::Baseline;
 use crate::causes::{Answer, Named, causes};
 use crate::course::Point;
-use crate::detectable::detectable;
-use crate::drive_use::{DriveRole, DriveUse, drive_uses};
-use crate::gain::{DriveError, HORIZON_S, drive_error, rms};
-use crate::held_out::gains;
-use crate::hypothesis::CATALOGUE;
-use crate::problem::{Problem, Reference};
-use crate::refit::Fit;
+use crate::drive_use::{DriveRole, drive_uses};
+use crate::gain::{DriveError, gain};
+use crate::observable::observable;
+use crate::problem::Problem;
 use crate::replay::{Module, Prepared};
 use crate::report_models::Models;
 use crate::search::MIN_EVIDENCE;
 use crate::sentence;
 use crate::sure::{Sure, beyond, describe, judge};
 use crate::unknown::Shape;
+use crate::wrong::wrong;
 use crate::{
-    Action, BeforeAfter, Detectable, Diagnosis, DiagnosisError, Drive, DriveSet, Executor, Finding,
-    FindingKind, Gain, NotObservable, Plant, Verdict, Wrong,
+    Action, Diagnosis, DiagnosisError, DriveSet, Executor, Finding, FindingKind, Plant, Verdict,
 };
 
 /// Choices of the caller.
@@ -58,46 +56,6 @@ pub enum Progress {
 
 /// Probability above which a cause is stated as the explanation.
 const EXPLAINED: f64 = 0.95;
-/// Timing, noise and tolerances of a truck and its logger, learned from drives that are in order.
-#[derive(Debug, Clone)]
-pub struct Baseline {
-    reference: Reference,
-    floor: Vec<DriveError>,
-    used: Vec<DriveUse>,
-}
-
-impl Baseline {
-    /// Error of the speed of drives over free runs of 60 s with the truck file and the timing of
-    /// this baseline, m/s.
-    #[must_use]
-    pub fn speed_rmse_m_s<'d>(
-        &self,
-        plant: &Plant,
-        drives: impl Iterator<Item = &'d crate::Drive>,
-    ) -> f64 {
-        let of = |d| drive_error(&Prepared::new(d, plant), plant, &self.reference.theta).speed;
-        rms(drives.map(of))
-    }
-
-    /// Learns from `drives` of the truck of `plant`; serves any number of diagnoses.
-    ///
-    /// # Errors
-    /// Drives that are too short or hold values that are no numbers.
-    pub fn learn(
-        plant: &Plant,
-        drives: &DriveSet,
-        executor: &dyn Executor,
-    ) -> Result<Self, DiagnosisError> {
-        crate::plausible::check_length(drives)?;
-        let clean = drives.drives.iter().map(|d| Prepared::new(d, plant)).collect();
-        let problem = Problem::learn(plant, clean, true, executor)?;
-        let zero = problem.reference.theta;
-        let floor: Vec<_> = problem.drives.iter().map(|d| drive_error(d, plant, &zero)).collect();
-        let used = problem.drives.iter().zip(&floor).map(|(d, e)| DriveUse::baseline(d, e));
-        let used = used.collect();
-        Ok(Self { reference: problem.reference, floor, used })
-    }
-}
 
 /// Finds what the simulation of `plant` gets wrong on `drives` and names the cause.
 ///
@@ -257,135 +215,4 @@ pub(crate) fn split(
         return Err(DiagnosisError::NoDrives { what: "no drive is left to learn from".into() });
     }
     Ok((learn, held))
-}
-
-/// Hypotheses that the drives can show, those that they cannot, and what they would have shown.
-fn observable(
-    problem: &Problem<'_>,
-    options: &Options,
-) -> (Vec<usize>, Vec<NotObservable>, Vec<Detectable>) {
-    let (mut open, mut not) = (Vec::new(), Vec::<NotObservable>::new());
-    let information = problem.evidence().information();
-    for (i, h) in CATALOGUE.iter().enumerate() {
-        if options.excluded.iter().any(|x| x == h.id) {
-            continue;
-        }
-        let missing: Vec<&str> = h
-            .channels
-            .iter()
-            .filter(|c| !problem.drives.iter().any(|d| d.has(&[**c])))
-            .map(|c| c.name())
-            .collect();
-        let why = if missing.is_empty() {
-            if 1.0 / information[i].max(1e-300).sqrt() > h.min_size {
-                sentence::not_excited(h.id).to_owned()
-            } else {
-                open.push(i);
-                continue;
-            }
-        } else {
-            format!("channels are missing: {}", missing.join(", "))
-        };
-        not.push(NotObservable { id: h.id, why, missing_channels: missing });
-    }
-    not.retain(|n| !open.iter().any(|i| CATALOGUE[*i].id == n.id));
-    not.dedup_by(|a, b| a.id == b.id);
-    let detectable = detectable(&open, &information);
-    (open, not, detectable)
-}
-
-fn gain(plant: &Plant, problem: &Problem<'_>, fit: &Fit) -> Gain {
-    let reference = &problem.reference;
-    let errors = |t| problem.drives.iter().map(|d| drive_error(d, plant, t)).collect::<Vec<_>>();
-    let (before, after) = (errors(&reference.theta), errors(&fit.theta));
-    let gains = gains(problem, &reference.theta, &fit.theta);
-    let both = |f: fn(&DriveError) -> [f64; 2]| BeforeAfter {
-        before: rms(before.iter().map(f)),
-        after: rms(after.iter().map(f)),
-    };
-    let fuel = |e: &[DriveError]| {
-        let (d, m) = e.iter().fold((0.0, 0.0), |a, e| (a.0 + e.fuel[0], a.1 + e.fuel[1]));
-        if m > 0.0 { f64::abs(d) / m } else { 0.0 }
-    };
-    let total: f64 = gains.iter().sum();
-    Gain {
-        held_out: problem.drives.iter().map(|d| d.name.clone()).collect(),
-        speed_rmse_m_s: both(|e| e.speed),
-        yaw_rate_rmse_rad_s: both(|e| e.yaw),
-        fuel_error_frac: BeforeAfter { before: fuel(&before), after: fuel(&after) },
-        log_score_nats: total,
-        significant: total > 3.0 && gains.iter().all(|g| *g > -3.0),
-    }
-}
-
-/// Root mean square of the measured signal of a module over its rows.
-fn signal_rms(problem: &Problem<'_>, m: Module) -> f64 {
-    let step = m.row_step();
-    if m == Module::Shift {
-        return rms(problem.drives.iter().flat_map(|d| &d.shifts).map(|s| {
-            let duration_s = s.1 as f64 * Drive::STEP_S;
-            [duration_s * duration_s, 1.0]
-        }));
-    }
-    rms(problem.drives.iter().map(|d| {
-        let x = d.measured(m);
-        d.valid[m as usize]
-            .iter()
-            .enumerate()
-            .filter(|(k, ok)| **ok && k * step < x.len())
-            .fold([0.0, 0.0], |a, (k, _)| [a[0] + x[k * step] * x[k * step], a[1] + 1.0])
-    }))
-}
-
-fn wrong(problem: &Problem<'_>, floor: &[DriveError]) -> Vec<Wrong> {
-    let zero = problem.reference.theta;
-    let errors: Vec<DriveError> =
-        problem.drives.iter().map(|d| drive_error(d, problem.plant, &zero)).collect();
-    let mut out = Vec::new();
-    let samples: f64 = errors.iter().map(|e| e.speed[1]).sum();
-    if samples > 0.0 {
-        let rmse = rms(errors.iter().map(|e| e.speed));
-        let power = (errors.iter().map(|e| e.speed_power).sum::<f64>() / samples).sqrt();
-        out.push(Wrong {
-            quantity: "speed_m_s",
-            horizon_s: HORIZON_S,
-            rmse,
-            bias: errors.iter().map(|e| e.speed_sum).sum::<f64>() / samples,
-            accuracy_frac: 1.0 - rmse / power.max(1e-9),
-            r#where: sentence::places(problem, Module::Force),
-            noise_floor: rms(floor.iter().map(|e| e.speed)),
-        });
-    }
-    for m in Module::ALL {
-        let i = m as usize;
-        if m == Module::Force || !problem.drives.iter().any(|d| d.available[i]) {
-            continue;
-        }
-        let (mut chi, mut rows, mut sum) = (0.0, 0.0, 0.0);
-        for k in 0..problem.drives.len() {
-            let w = problem.whitened(k, &zero);
-            for (x, ok) in w[i].iter().zip(&problem.drives[k].valid[i]) {
-                if *ok {
-                    chi += x * x;
-                    sum += x;
-                    rows += 1.0;
-                }
-            }
-        }
-        let sigma = problem.reference.whiteners[i].sigma;
-        let ratio = chi / f64::max(rows, 1.0);
-        let floor = problem.reference.ratio[i].max(1.0);
-        if ratio > 1.5 * floor {
-            out.push(Wrong {
-                quantity: m.quantity(),
-                horizon_s: 0.0,
-                rmse: sigma * ratio.sqrt(),
-                bias: -sigma * sum / rows,
-                accuracy_frac: 1.0 - sigma * ratio.sqrt() / signal_rms(problem, m).max(1e-12),
-                r#where: sentence::places(problem, m),
-                noise_floor: sigma * floor.sqrt(),
-            });
-        }
-    }
-    out
 }

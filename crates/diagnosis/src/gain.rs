@@ -1,11 +1,12 @@
 //! What an extension is worth on drives that it has not seen: rollouts of 60 s before and after.
 
-use crate::Drive;
-use crate::Plant;
+use crate::held_out::gains;
 use crate::param::Theta;
-use crate::problem::replay;
+use crate::problem::{Problem, replay};
+use crate::refit::Fit;
 use crate::replay::force::Longitudinal;
 use crate::replay::{Module, Prepared};
+use crate::{BeforeAfter, Drive, Gain, Plant};
 
 /// Length of a rollout, s.
 pub(crate) const HORIZON_S: f64 = 60.0;
@@ -85,4 +86,29 @@ pub(crate) fn drive_error_by(
 pub(crate) fn rms(parts: impl Iterator<Item = [f64; 2]>) -> f64 {
     let (s, n) = parts.fold((0.0, 0.0), |a, p| (a.0 + p[0], a.1 + p[1]));
     if n > 0.0 { (s / n).sqrt() } else { 0.0 }
+}
+
+/// What the causes of a fit gain on drives held out.
+pub(crate) fn gain(plant: &Plant, problem: &Problem<'_>, fit: &Fit) -> Gain {
+    let reference = &problem.reference;
+    let errors = |t| problem.drives.iter().map(|d| drive_error(d, plant, t)).collect::<Vec<_>>();
+    let (before, after) = (errors(&reference.theta), errors(&fit.theta));
+    let gains = gains(problem, &reference.theta, &fit.theta);
+    let both = |f: fn(&DriveError) -> [f64; 2]| BeforeAfter {
+        before: rms(before.iter().map(f)),
+        after: rms(after.iter().map(f)),
+    };
+    let fuel = |e: &[DriveError]| {
+        let (d, m) = e.iter().fold((0.0, 0.0), |a, e| (a.0 + e.fuel[0], a.1 + e.fuel[1]));
+        if m > 0.0 { f64::abs(d) / m } else { 0.0 }
+    };
+    let total: f64 = gains.iter().sum();
+    Gain {
+        held_out: problem.drives.iter().map(|d| d.name.clone()).collect(),
+        speed_rmse_m_s: both(|e| e.speed),
+        yaw_rate_rmse_rad_s: both(|e| e.yaw),
+        fuel_error_frac: BeforeAfter { before: fuel(&before), after: fuel(&after) },
+        log_score_nats: total,
+        significant: total > 3.0 && gains.iter().all(|g| *g > -3.0),
+    }
 }

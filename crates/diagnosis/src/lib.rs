@@ -14,8 +14,24 @@
 //! assert!(!found.causes.is_empty()); // more drag than the truck file has
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! Pure: drives, time, seeds and the [`Executor`] are arguments; only `read` and `from_log` open files
+//! that they are given.
+//!
+//! | room | files |
+//! |---|---|
+//! | data | `channel`, `drive`, `read`, `from_log`, `index`, `table`, `finding`, `plausible`, `clock` |
+//! | causes | `hypothesis`, `param`, `sentence`; physics and words stand in `dynamics::catalogue` |
+//! | replay | `plant`, `replay`, `signal`, `parts` |
+//! | problem | `problem`, `course`, `baseline`, `stats` |
+//! | search | `evidence`, `screen`, `fit`, `refit`, `search`, `gate`, `held_out`, `weights` |
+//! | outside the catalogue | `unknown`, `catch_all`, `sure` |
+//! | answer | `diagnosis`, `causes`, `wrong`, `observable`, `detectable`, `gain`, `verdict`, `overlay` |
+//! | run | `outcome`, `report`, `drive_use`, `table_trial`, `executor` |
+//! | studies | `identify`, `experiment` with `logger` (simulated), `fidelity`, `whole_run`, `lateral_id` |
 #![cfg_attr(test, allow(clippy::indexing_slicing))]
 
+mod baseline;
 mod catch_all;
 mod causes;
 mod channel;
@@ -41,6 +57,7 @@ pub mod identify;
 mod index;
 pub mod lateral_id;
 pub mod logger;
+mod observable;
 mod outcome;
 mod overlay;
 mod param;
@@ -61,15 +78,16 @@ mod stats;
 mod sure;
 mod table;
 mod table_trial;
-mod threads;
 mod unknown;
 mod verdict;
 mod weights;
 mod whole_run;
+mod wrong;
 
+pub use baseline::Baseline;
 pub use channel::Channel;
 pub use detectable::Detectable;
-pub use diagnosis::{Baseline, Options, Progress, diagnose, diagnose_with};
+pub use diagnosis::{Options, Progress, diagnose, diagnose_with};
 pub use drive::{CoastDown, Drive, DriveSet, RoadMap};
 pub use drive_use::{DriveRole, DriveUse, SizeAlone};
 pub use dynamics::catalogue::CauseKind;
@@ -85,7 +103,6 @@ pub use replay::Module;
 pub use report_models::Models;
 pub use table::Table;
 pub use table_trial::{TableTrial, try_table};
-pub use threads::Threads;
 pub use verdict::{
     BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Parameter, Unknown, Verdict,
     Wrong,

@@ -15,6 +15,7 @@ mod picture;
 mod progress;
 mod provenance;
 mod signals;
+mod threads;
 
 use std::process::ExitCode;
 

@@ -6,20 +6,14 @@ use std::path::Path;
 use dynamics::{TruckModel, TruckParameters};
 use j1939::bus::BusError;
 use j1939::bus::candump::messages;
-use road::{GeoReference, Road};
-use serde::Serialize;
 
+use super::map::{Map, Place};
 use super::observable::Causes;
-use super::{
-    Choice, Conversion, Converted, Dbc, LeftOut, Log, LoggedDrive, OnRoad, Span, Unfilled,
-};
+use super::report::{DriveReport, LogReport, Report};
+use super::{Conversion, Converted, Dbc, Log, LoggedDrive, OnRoad};
 use crate::plausible::MIN_DURATION_S;
 use crate::{DiagnosisError, Table, drives_index};
 
-/// Step of the map table, m.
-const MAP_STEP_M: f64 = 5.0;
-/// A fix farther off the reference line is not on the road, m.
-const OFF_ROAD_M: f64 = 30.0;
 /// The map table.
 const MAP: &str = "map.csv";
 /// Logs in containers of other tools, by the end of their name.
@@ -34,24 +28,6 @@ pub struct LogFile<'a> {
     pub named: &'a Path,
     /// Mass on the load sheet, kg; none: what the bus says (CVW).
     pub mass_kg: Option<f64>,
-}
-
-/// From latitude and longitude, deg, to a map, m.
-pub type Project = Box<dyn Fn(f64, f64) -> [f64; 2]>;
-
-/// The road that was driven.
-pub struct Map {
-    name: String,
-    road: Road,
-    place: Place,
-}
-
-/// How the place on the road is found.
-enum Place {
-    /// By satellite fixes.
-    Fixes(Project),
-    /// By the wheels, from this station, m.
-    From(f64),
 }
 
 /// What is converted, and how.
@@ -82,42 +58,6 @@ pub struct DriveFolder {
     pub report: Report,
 }
 
-/// What `conversion.json` holds.
-#[derive(Debug, Serialize)]
-pub struct Report {
-    /// The truck, as the user gave it.
-    truck: String,
-    /// The road, as the user gave it.
-    map: Option<String>,
-    logs: Vec<LogReport>,
-    #[serde(flatten)]
-    causes: Causes,
-}
-
-#[derive(Debug, Serialize)]
-struct LogReport {
-    log: String,
-    duration_s: f64,
-    messages: u64,
-    channels: usize,
-    mass_kg: Option<f64>,
-    mass_from: &'static str,
-    columns: Vec<Choice>,
-    missing: Vec<Unfilled>,
-    drives: Vec<DriveReport>,
-    left_out: Vec<LeftOut>,
-}
-
-#[derive(Debug, Serialize)]
-struct DriveReport {
-    name: String,
-    #[serde(flatten)]
-    span: Span,
-    distance_m: f64,
-    on_map: bool,
-    notes: Vec<String>,
-}
-
 /// What goes wrong while a log is heard.
 enum Heard {
     Bus(BusError),
@@ -140,55 +80,6 @@ pub fn open(log: &Path) -> std::io::Result<Box<dyn BufRead>> {
         return Ok(Box::new(std::io::BufReader::new(flate2::read::MultiGzDecoder::new(file))));
     }
     Ok(Box::new(std::io::BufReader::new(file)))
-}
-
-impl Map {
-    /// A road; the wheels count from `start_s_m`, else satellite fixes say where on it a drive is.
-    ///
-    /// # Errors
-    /// [`DiagnosisError::Map`]: no road, a start behind its end, or fixes on a road that does not
-    /// say where on earth it lies.
-    pub fn load(
-        name: &str,
-        start_s_m: Option<f64>,
-        project: &dyn Fn(&GeoReference) -> Result<Project, String>,
-    ) -> Result<Self, DiagnosisError> {
-        let bad = |why: String| DiagnosisError::Map { map: name.to_owned(), why };
-        let road = Road::load(name).map_err(|e| DiagnosisError::Road(e.to_string()))?;
-        let place = match (start_s_m, road.geo_reference()) {
-            (Some(start_m), _) if !(0.0..road.length_m()).contains(&start_m) => {
-                let length_m = road.length_m();
-                return Err(bad(format!(
-                    "the drive begins at {start_m} m, the road ends at {length_m:.0} m"
-                )));
-            }
-            (Some(start_m), _) => Place::From(start_m),
-            (None, Some(reference)) => Place::Fixes(project(reference).map_err(bad)?),
-            (None, None) => {
-                return Err(bad("the road does not say where on earth it lies; say where on it \
-                                the drive begins (start-s-m)"
-                    .to_owned()));
-            }
-        };
-        Ok(Self { name: name.to_owned(), road, place })
-    }
-
-    fn station_m(&self, latitude_deg: f64, longitude_deg: f64, hint_m: Option<f64>) -> Option<f64> {
-        let Place::Fixes(project) = &self.place else { return None };
-        let [x_m, y_m] = project(latitude_deg, longitude_deg);
-        let at = self.road.project(x_m, y_m, hint_m)?;
-        (at.d_m.abs() <= OFF_ROAD_M).then_some(at.s_m)
-    }
-
-    fn table(&self) -> Table {
-        let mut table = Table::new("map".to_owned(), &["s_m", "grade_frac", "curvature_1_m"]);
-        let steps = (self.road.length_m() / MAP_STEP_M) as usize;
-        for k in 0..=steps {
-            let at = self.road.at(MAP_STEP_M * k as f64, 0.0);
-            table.push(&[MAP_STEP_M * k as f64, at.grade_rad.tan(), at.curvature_1_m]);
-        }
-        table
-    }
 }
 
 impl Job<'_> {
@@ -347,56 +238,5 @@ impl DriveFolder {
             write(MAP, map.csv())?;
         }
         write("drives.toml", drives_index(&self.truck, &self.tables)?)
-    }
-}
-
-impl Report {
-    /// What was made, for people.
-    #[must_use]
-    pub fn sentences(&self) -> String {
-        let mut lines = Vec::new();
-        for log in &self.logs {
-            for drive in &log.drives {
-                let place = if drive.on_map { ", on the map" } else { "" };
-                lines.push(format!(
-                    "{}: {:.0} s, {:.1} km{place}",
-                    drive.name,
-                    drive.span.duration_s(),
-                    1e-3 * drive.distance_m
-                ));
-                lines.extend(drive.notes.iter().map(|note| format!("  {note}")));
-            }
-            for part in &log.left_out {
-                lines.push(format!(
-                    "{} at {:.0} s left out: {}",
-                    log.log, part.span.from_s, part.why
-                ));
-            }
-            lines.extend(log.columns.iter().map(Choice::sentence));
-            lines.extend(log.missing.iter().map(|m| format!("  no {}: {}", m.column, m.why)));
-            if log.mass_kg.is_none() {
-                lines.push("  no mass: neither --mass-kg nor a message (CVW)".to_owned());
-            }
-        }
-        lines.extend(self.causes.sentences());
-        lines.join("\n")
-    }
-}
-
-impl Choice {
-    fn sentence(&self) -> String {
-        let more = if self.others.is_empty() {
-            String::new()
-        } else {
-            format!("; also {}", self.others.join(", "))
-        };
-        format!(
-            "  {} from {} of {:02X} every {:.0} ms, there {:.0} % of the time{more}",
-            self.column,
-            self.signal,
-            self.address,
-            1e3 * self.period_s,
-            100.0 * self.fresh_frac
-        )
     }
 }

@@ -13,6 +13,8 @@
 //! | `place` | where on a map it was |
 //! | `dbc` | signals of the truck's maker, by a file of the user |
 //! | `folder` | logs and a map into a folder of drives: all of it for a shell |
+//! | `map` | the road and where a fix lies on it |
+//! | `report` | what was chosen, in words |
 //! | `grade` | its grade where there is no map |
 
 mod choose;
@@ -20,8 +22,10 @@ mod collect;
 mod dbc;
 mod folder;
 pub(crate) mod grade;
+mod map;
 mod observable;
 mod place;
+mod report;
 mod signals;
 mod trips;
 
@@ -30,8 +34,10 @@ use serde::Serialize;
 pub use choose::{Choice, Unfilled};
 pub use collect::Log;
 pub use dbc::{Assigned, Dbc};
-pub use folder::{DriveFolder, Job, LogFile, Map, Project, Report, open};
+pub use folder::{DriveFolder, Job, LogFile, open};
+pub use map::{Map, Project};
 pub use place::{Locate, OnRoad};
+pub use report::Report;
 pub use trips::Span;
 
 use crate::{Channel, DiagnosisError, Drive};

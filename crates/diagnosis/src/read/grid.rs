@@ -9,6 +9,8 @@ use crate::finding::{Action, Finding, FindingKind};
 use crate::{Channel, DiagnosisError};
 
 use super::RawTable;
+use super::clean::clean;
+use super::stuck::stuck;
 
 /// Shortest drive that is read, s.
 const MIN_DRIVE_S: f64 = 60.0;
@@ -20,14 +22,6 @@ const SLOWEST_READING_S: f64 = 60.0;
 const LONGEST_DRIVE_S: f64 = 86_400.0;
 /// No log of a truck is as slow as this, s from row to row.
 const SLOWEST_STEP_S: f64 = 5.0;
-/// Part of a channel that may be missing or implausible and is interpolated over.
-const MAX_BAD_FRAC: f64 = 0.02;
-/// A channel that must move and does not for this long while the truck drives is stuck, s.
-const STUCK_S: f64 = 30.0;
-/// A receiver's jump back or forth is over by then, s.
-const LEAP_S: f64 = 3.0;
-/// Spread of a road speed that is held, m/s: an engine speed in whole steps rests then.
-const HELD_M_S: f64 = 0.05;
 
 pub(super) fn to_grid(
     name: &str,
@@ -201,149 +195,6 @@ fn note_gaps(t: &[f64], typical: f64, note: &mut Note<'_>) {
     }
 }
 
-/// Interpolates over bad samples; false if the channel is beyond use.
-fn clean(channel: Channel, t: &[f64], v: &mut [f64], note: &mut Note<'_>) -> bool {
-    let (lo, hi) = channel.plausible();
-    let name = Some(channel.name());
-    let bad: Vec<bool> = v.iter().map(|x| !x.is_finite()).collect();
-    let missing = bad.iter().filter(|b| **b).count();
-    let first = |b: &[bool]| b.iter().position(|b| *b).map(|i| t[i]);
-    let enough = |n: usize| n as f64 <= MAX_BAD_FRAC * t.len() as f64;
-    if missing == v.len() {
-        let kind = FindingKind::NonFinite { samples: missing };
-        note(name, first(&bad), kind, Action::ChannelDropped);
-        return false;
-    }
-    if missing > 0 {
-        let ok = enough(missing);
-        let action = if ok { Action::Interpolated } else { Action::ChannelDropped };
-        note(name, first(&bad), FindingKind::NonFinite { samples: missing }, action);
-        if !ok {
-            return false;
-        }
-    }
-    let largest = v.iter().filter(|x| x.is_finite()).fold(0.0_f64, |a, x| a.max(x.abs()));
-    if let Some((suspected, factor)) = unit_error(channel, v, largest) {
-        v.iter_mut().for_each(|x| *x *= factor);
-        note(name, None, FindingKind::WrongUnit { suspected }, Action::Corrected);
-    }
-    let outside: Vec<bool> = v.iter().map(|x| x.is_finite() && !(lo..=hi).contains(x)).collect();
-    let implausible = outside.iter().filter(|b| **b).count();
-    if implausible > 0 {
-        let value = v.iter().zip(&outside).find(|p| *p.1).map_or(f64::NAN, |p| *p.0);
-        let ok = enough(implausible + missing);
-        let action = if ok { Action::Interpolated } else { Action::ChannelDropped };
-        let kind = FindingKind::Implausible { samples: implausible, value };
-        note(name, first(&outside), kind, action);
-        if !ok {
-            return false;
-        }
-    }
-    let leaps = leaps(channel, t, v, &bad);
-    let leapt = leaps.iter().filter(|b| **b).count();
-    if leapt > 0 {
-        let value = v.iter().zip(&leaps).find(|p| *p.1).map_or(f64::NAN, |p| *p.0);
-        let ok = enough(leapt + implausible + missing);
-        let action = if ok { Action::Interpolated } else { Action::ChannelDropped };
-        note(name, first(&leaps), FindingKind::Jump { samples: leapt, value }, action);
-        if !ok {
-            return false;
-        }
-    }
-    let bad = bad.iter().zip(&outside).zip(&leaps);
-    let mask: Vec<bool> = bad.map(|((a, b), c)| *a || *b || *c).collect();
-    interpolate_over(t, v, &mask);
-    true
-}
-
-/// What a receiver can show from one sample to the next: a step, and a rate per second.
-fn most_change(channel: Channel) -> Option<(f64, f64)> {
-    match channel {
-        Channel::GpsSpeedMS => Some((3.0, 4.0)),
-        Channel::GpsAltitudeM => Some((15.0, 10.0)),
-        _ => None,
-    }
-}
-
-/// Samples of a receiver that are too far from the last good one; what stays there for longer than
-/// [`LEAP_S`] is believed again.
-fn leaps(channel: Channel, t: &[f64], v: &[f64], bad: &[bool]) -> Vec<bool> {
-    let mut found = vec![false; v.len()];
-    let Some((step, rate)) = most_change(channel) else { return found };
-    let mut good: Option<usize> = None;
-    for i in 0..v.len() {
-        if bad[i] {
-            continue;
-        }
-        let far = good.is_some_and(|k| {
-            let seconds = t[i] - t[k];
-            seconds < LEAP_S && (v[i] - v[k]).abs() > step + rate * seconds
-        });
-        if far {
-            found[i] = true;
-        } else {
-            good = Some(i);
-        }
-    }
-    found
-}
-
-/// Units that are often mistaken and leave a range that no truck shows.
-fn unit_error(channel: Channel, v: &[f64], largest: f64) -> Option<(&'static str, f64)> {
-    let mut sorted: Vec<f64> = v.iter().copied().filter(|x| x.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted[sorted.len() / 2];
-    let beyond = |limit: f64| (sorted.len() - sorted.partition_point(|x| *x <= limit)) as f64;
-    match channel {
-        // faster than any truck for longer than spikes last
-        Channel::SpeedMS | Channel::GpsSpeedMS
-            if largest <= 60.0 * 3.6 && beyond(60.0) > MAX_BAD_FRAC * sorted.len() as f64 =>
-        {
-            Some(("km/h", 1.0 / 3.6))
-        }
-        // a whole drive below 1.3 % of the reference torque
-        Channel::EngineTorquePercent if (0.2..=1.3).contains(&largest) => Some(("fraction", 100.0)),
-        Channel::AcceleratorPedalFrac | Channel::EngineBrakeFrac
-            if largest > 1.5 && largest <= 101.0 =>
-        {
-            Some(("percent", 0.01))
-        }
-        Channel::CoolantTempDegc | Channel::AmbientTempDegc if median > 200.0 => None,
-        Channel::BaroPressurePa if (40.0..110.0).contains(&median) => Some(("kPa", 1e3)),
-        Channel::BaroPressurePa if (400.0..1100.0).contains(&median) => Some(("hPa", 1e2)),
-        Channel::BrakePressureKpa if largest > 5e3 => Some(("Pa", 1e-3)),
-        Channel::GradeFrac if largest > 0.5 && largest < 25.0 => Some(("percent", 0.01)),
-        Channel::YawRateRadS | Channel::TrailerYawRateRadS if largest > 4.0 => {
-            Some(("deg/s", core::f64::consts::PI / 180.0))
-        }
-        Channel::SteeringWheelRad if largest > 40.0 => Some(("deg", core::f64::consts::PI / 180.0)),
-        _ => None,
-    }
-}
-
-fn interpolate_over(t: &[f64], v: &mut [f64], bad: &[bool]) {
-    let mut last: Option<usize> = None;
-    let mut i = 0;
-    while i < v.len() {
-        if !bad[i] {
-            last = Some(i);
-            i += 1;
-            continue;
-        }
-        let next = (i..v.len()).find(|&j| !bad[j]);
-        let end = next.unwrap_or(v.len());
-        for j in i..end {
-            v[j] = match (last, next) {
-                (Some(a), Some(b)) => v[a] + (v[b] - v[a]) * (t[j] - t[a]) / (t[b] - t[a]),
-                (Some(a), None) => v[a],
-                (None, Some(b)) => v[b],
-                (None, None) => 0.0,
-            };
-        }
-        i = end;
-    }
-}
-
 /// Linear interpolation to the grid; the previous value for discrete channels.
 fn resample(t: &[f64], v: &[f64], start: f64, len: usize, discrete: bool) -> Vec<f64> {
     let mut out = Vec::with_capacity(len);
@@ -396,47 +247,6 @@ fn speed_unit(drive: &mut Drive, speed: &mut Vec<f64>, note: &mut Note<'_>) {
     }
 }
 
-fn stuck(drive: &mut Drive, speed: &[f64], note: &mut Note<'_>) {
-    let channels: Vec<Channel> =
-        Channel::all().filter(|c| !c.may_rest() && drive.has(*c)).collect();
-    for channel in channels {
-        let Some(v) = drive.get(channel) else { continue };
-        let (mut from, mut longest, mut at, mut total) = (0, 0, 0, 0);
-        for i in 1..=v.len() {
-            let still = i < v.len() && v[i] == v[i - 1] && speed[i] > 5.0;
-            if still {
-                continue;
-            }
-            let run = i - from;
-            let rests = channel == Channel::EngineSpeedRpm && is_held(&speed[from..i]);
-            if run as f64 * Drive::STEP_S > STUCK_S && !rests {
-                total += run;
-                if run > longest {
-                    (longest, at) = (run, from);
-                }
-            }
-            from = i;
-        }
-        if longest > 0 {
-            let drop = total as f64 > 0.2 * v.len() as f64 && channel != Channel::SpeedMS;
-            let kind = FindingKind::Stuck { seconds: longest as f64 * Drive::STEP_S };
-            let time = drive.start_s + at as f64 * Drive::STEP_S;
-            let action = if drop { Action::ChannelDropped } else { Action::Kept };
-            note(Some(channel.name()), Some(time), kind, action);
-            if drop {
-                drive.remove(channel);
-            }
-        }
-    }
-}
-
-/// Whether a road speed is held: cruise control on an even road.
-fn is_held(speed: &[f64]) -> bool {
-    let (low, high) =
-        speed.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, v| (a.0.min(*v), a.1.max(*v)));
-    high - low < HELD_M_S
-}
-
 /// Grade and curvature at the map position, where the table does not carry them.
 pub(super) fn fill_from_map(drive: &mut Drive) {
     let (Some(s), Some(map)) = (drive.get(Channel::SMapM).map(<[f64]>::to_vec), drive.map.clone())
@@ -452,25 +262,5 @@ pub(super) fn fill_from_map(drive: &mut Drive) {
             let v = s.iter().map(|s| curve.at(*s)).collect();
             drive.set(channel, v);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_engine_speed_rests_while_the_road_speed_is_held_and_else_it_is_stuck() {
-        let stuck_with = |swing_m_s: f64| {
-            let mut drive = Drive::new("d", 0.0, 2000);
-            let speed: Vec<f64> =
-                (0..2000).map(|i| 22.0 + swing_m_s * libm::sin(0.01 * f64::from(i))).collect();
-            drive.set(Channel::EngineSpeedRpm, vec![1141.0; 2000]);
-            let mut found = 0;
-            stuck(&mut drive, &speed, &mut |_, _, _, _| found += 1);
-            (found, drive.has(Channel::EngineSpeedRpm))
-        };
-        assert_eq!(stuck_with(0.01), (0, true));
-        assert_eq!(stuck_with(1.0), (1, false));
     }
 }

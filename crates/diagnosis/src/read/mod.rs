@@ -1,8 +1,10 @@
 //! Reads a folder of measured drives: `drives.toml` and one table per drive.
 
+mod clean;
 mod csv_table;
 mod grid;
 mod parquet_table;
+mod stuck;
 mod units;
 
 use std::path::Path;

@@ -8,12 +8,15 @@
 mod air;
 mod brake;
 mod co2;
+mod engaged;
 pub(crate) mod force;
 mod inputs;
 mod lateral;
 mod powertrain;
 mod prepared;
 mod profiles;
+mod rows;
+mod section;
 mod sensors;
 mod smooth;
 

@@ -1,13 +1,14 @@
 //! A drive made ready for replay: channels with defaults, air density, masks per module.
 
-use dynamics::effects::driveline::RELEASED_PEDAL_FRAC;
 use dynamics::effects::resistance::air_density_kg_m3;
 use dynamics::effects::table::TableSignal;
 use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::co2;
+use super::engaged::{engaged, runs, steady_ratio};
 use super::inputs::Inputs;
 use super::profiles::Profiles;
+use super::section::GradeBySection;
 use super::smooth;
 use super::{MODULES, Module as M};
 use crate::{Channel as C, Drive, Plant};
@@ -74,72 +75,8 @@ pub(crate) struct Prepared {
     pub(crate) has: Vec<C>,
 }
 
-/// Grade over the position, on a uniform grid.
-pub(crate) struct GradeBySection {
-    start_m: f64,
-    values: Vec<f64>,
-}
-
-const SECTION_M: f64 = 4.0;
-
-impl GradeBySection {
-    fn new(s: &[f64], grade: &[f64]) -> Self {
-        let (lo, hi) =
-            s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |a, x| (a.0.min(*x), a.1.max(*x)));
-        let cells = (((hi - lo) / SECTION_M) as usize + 2).min(1_000_000);
-        let (mut sum, mut count) = (vec![0.0; cells], vec![0.0; cells]);
-        for (s, g) in s.iter().zip(grade) {
-            let i = (((s - lo) / SECTION_M) as usize).min(cells - 1);
-            sum[i] += g;
-            count[i] += 1.0;
-        }
-        let mut last = grade.first().copied().unwrap_or(0.0);
-        let values = sum
-            .iter()
-            .zip(&count)
-            .map(|(s, c)| {
-                if *c > 0.0 {
-                    last = s / c;
-                }
-                last
-            })
-            .collect();
-        Self { start_m: lo, values }
-    }
-
-    pub(crate) fn at(&self, s_m: f64) -> f64 {
-        let x = ((s_m - self.start_m) / SECTION_M - 0.5).max(0.0);
-        let i = (x as usize).min(self.values.len() - 1);
-        let j = (i + 1).min(self.values.len() - 1);
-        self.values[i] + (x - i as f64).min(1.0) * (self.values[j] - self.values[i])
-    }
-}
-
-/// Indicated torque up to which a message of 1 % a bit with its noise may be zero, percent of the
-/// reference torque: what burns no more than this is not judged.
-const CUT_OFF_PERCENT: f64 = 2.5;
-/// Torque above which nobody brakes who has a foot on the accelerator, percent, and samples until brakes that were on are off.
-const PULLS: f64 = 3.0;
-const RELEASE: i32 = 30;
-
-/// Fuel rate below which an engine that runs may be said not to burn any, g/s: half of idling.
-const LEAST_FUEL_G_S: f64 = 0.2;
-
-/// Samples after which a pressure that rests under a demand that rests says nothing new: a truck
-/// that is held for an hour repeats the rounding of one message.
-const RESTS: usize = 20;
-
-/// Without a gear, a driveline counts from this engine speed over idling and this speed on, m/s, where
-/// their ratio changes by less than a part in the margin of a shift.
-const OVER_IDLE: f64 = 1.15;
-const LEAST_M_S: f64 = 2.5;
-const RESTS_FRAC: f64 = 0.03;
-
 /// Rows of a logged coast-down are no further apart, s.
 const LOGGED_S: f64 = 1.0;
-
-/// Samples kept away from a shift on either side.
-const SHIFT_MARGIN: usize = 12;
 
 impl Prepared {
     pub(crate) fn new(drive: &Drive, plant: &Plant) -> Self {
@@ -311,181 +248,6 @@ impl Prepared {
     pub(crate) fn gravity_along(grade_frac: f64) -> f64 {
         GRAVITY_M_S2 * grade_frac / (1.0 + grade_frac * grade_frac).sqrt()
     }
-
-    /// Where brakes that no channel shows may act: with the demand if that is there, otherwise
-    /// wherever the engine does not pull.
-    fn may_be_held(&self) -> Vec<bool> {
-        let unseen = !self.has(&[C::BrakePressureKpa]);
-        let demanded = unseen && self.has(&[C::XbrDecelMS2]);
-        let coasting = unseen && !demanded || !self.has(&[C::EngineBrakeFrac]);
-        let released = self.has(&[C::AcceleratorPedalFrac]);
-        let mut left = 0;
-        (0..self.n)
-            .map(|i| {
-                let pulls =
-                    self.torque[i] >= PULLS && !(released && self.pedal[i] < RELEASED_PEDAL_FRAC);
-                let held = demanded && self.xbr[i] > 0.0 || coasting && !pulls;
-                left = if held { RELEASE } else { (left - 1).max(0) };
-                left > 0
-            })
-            .collect()
-    }
-
-    fn mask(&mut self, plant: &Plant) {
-        let n = self.n;
-        let rows = |m: M, ok: &dyn Fn(usize, usize) -> bool| -> Vec<bool> {
-            let step = m.row_step();
-            (0..(n / step).saturating_sub(2)).map(|k| ok(k * step, (k + 1) * step)).collect()
-        };
-        let seconds =
-            |m: M, ok: &dyn Fn(usize) -> bool| rows(m, &|a, b| (a..(b + 4).min(n)).all(ok));
-        let mut valid: [Vec<bool>; MODULES] = Default::default();
-        let pulled = self.has(&[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear]);
-        if (pulled || self.coasts) && self.has(&[C::GradeFrac]) {
-            let held = self.may_be_held();
-            let rolls = |i: usize| self.coasts || self.engaged[i] && !held[i];
-            valid[M::Force as usize] = seconds(M::Force, &|i| rolls(i) && self.speed[i] > 3.0);
-        }
-        if self.has(&[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm]) {
-            let idle = plant.truck.engine.idle_speed_rpm + 80.0;
-            valid[M::Torque as usize] = rows(M::Torque, &|a, b| {
-                (a..b).all(|i| self.engaged[i] && self.rpm[i] > idle && self.speed[i] > 3.0)
-            });
-        }
-        if self.has(&[C::XbrDecelMS2, C::BrakePressureKpa]) {
-            let tells: Vec<bool> = (0..n)
-                .map(|i| {
-                    let since = |samples: usize| i.saturating_sub(samples)..=i;
-                    let held = since(RESTS).all(|j| {
-                        self.pressure[j] == self.pressure[i] && self.xbr[j] == self.xbr[i]
-                    });
-                    !held && since(30).any(|j| self.xbr[j] > 0.0 || self.pressure[j] > 0.0)
-                })
-                .collect();
-            valid[M::Brake as usize] = rows(M::Brake, &|a, b| (a..b).all(|i| tells[i]));
-        }
-        if self.has(&[C::ShiftInProcess]) {
-            valid[M::Shift as usize] = vec![true; self.shifts.len()];
-        }
-        if self.has(&[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm]) {
-            let reference_nm = plant.truck.engine.reference_torque_nm;
-            let least_nm = 0.01 * CUT_OFF_PERCENT * reference_nm;
-            let least_g_s: Vec<f64> = self
-                .rpm
-                .iter()
-                .map(|rpm| plant.engine.fuel_rate_g_s(rpm / RPM_PER_RAD_S, least_nm))
-                .collect();
-            valid[M::Fuel as usize] = rows(M::Fuel, &|a, b| {
-                // No fuel at all is the overrun cut-off of the engine control, not its map, and
-                // near zero the torque message is cut at zero. Judged by the fuel: rows chosen by
-                // a noisy torque are rows whose noise has one sign.
-                (a..b)
-                    .all(|i| self.engaged[i] && self.speed[i] > 3.0 && self.fuel[i] > least_g_s[i])
-            });
-        }
-        if self.has(&[C::SteeringWheelRad]) {
-            let moving: Vec<bool> = {
-                let mut since = 0;
-                self.speed
-                    .iter()
-                    .map(|v| {
-                        since = if *v > 5.0 { since + 1 } else { 0 };
-                        since > 80
-                    })
-                    .collect()
-            };
-            for (m, c) in [
-                (M::Yaw, C::YawRateRadS),
-                (M::TrailerYaw, C::TrailerYawRateRadS),
-                (M::AccelY, C::AccelYMS2),
-            ] {
-                if self.has(&[c]) {
-                    valid[m as usize] = rows(m, &|a, b| (a..b).all(|i| moving[i]));
-                }
-            }
-        }
-        if self.has(&[C::GpsSpeedMS]) {
-            valid[M::Gps as usize] = rows(M::Gps, &|a, b| (a..b).all(|i| self.speed[i] > 2.0));
-        }
-        if self.has(&[C::GpsAltitudeM, C::GradeFrac]) {
-            valid[M::Altitude as usize] = rows(M::Altitude, &|_, _| true);
-        }
-        if self.has(&[C::HeadingRad, C::YawRateRadS]) {
-            valid[M::Heading as usize] = rows(M::Heading, &|_, _| true);
-        }
-        if self.has(&[C::AccelXMS2, C::GradeFrac]) {
-            valid[M::Imu as usize] = seconds(M::Imu, &|i| self.speed[i] > 3.0);
-        }
-        if self.has(&[C::FuelRateGS, C::Co2RateGS]) {
-            // An engine that stands still has no ratio, and what is measured first was burnt before
-            // the log.
-            let burns = |i: usize| self.fuel[i] > LEAST_FUEL_G_S;
-            valid[M::Co2 as usize] = rows(M::Co2, &|a, b| a >= co2::TRANSPORT && (a..b).all(burns));
-        }
-        for (a, v) in self.available.iter_mut().zip(&valid) {
-            *a = v.iter().filter(|x| **x).count() >= 8;
-        }
-        self.valid = valid;
-    }
-}
-
-fn runs(on: &[bool]) -> Vec<(usize, usize)> {
-    let mut out = Vec::new();
-    let mut start = None;
-    for (i, s) in on.iter().enumerate() {
-        match (s, start) {
-            (true, None) => start = Some(i),
-            (false, Some(a)) => {
-                out.push((a, i - a));
-                start = None;
-            }
-            _ => {}
-        }
-    }
-    out
-}
-
-/// In gear, clutch closed (engine speed fits the gear), no shift within the margin.
-fn engaged(
-    plant: &Plant,
-    speed: &[f64],
-    rpm: &[f64],
-    gear: &[usize],
-    shifting: &[bool],
-) -> Vec<bool> {
-    let n = speed.len();
-    let mut near = vec![false; n];
-    for i in 0..n {
-        if shifting[i] || (i > 0 && gear[i] != gear[i - 1]) {
-            let (a, b) = (i.saturating_sub(SHIFT_MARGIN), (i + SHIFT_MARGIN).min(n - 1));
-            near[a..=b].fill(true);
-        }
-    }
-    (0..n)
-        .map(|i| {
-            let in_gear = |g| plant.truck.driveline.engine_speed_rad_s(speed[i], g);
-            let expected = u8::try_from(gear[i]).map_or(0.0, in_gear) * RPM_PER_RAD_S;
-            expected != 0.0 && !near[i] && (rpm[i] - expected).abs() < 60.0 + 0.08 * expected
-        })
-        .collect()
-}
-
-/// Where no gear was logged: the engine pulls or is turned, and engine over road speed rests over the
-/// margins of a shift, as it does in a gear whether or not a converter slips.
-fn steady_ratio(plant: &Plant, speed: &[f64], rpm: &[f64]) -> Vec<bool> {
-    let idle = plant.truck.engine.idle_speed_rpm;
-    let ratio = |i: usize| {
-        let turns = rpm[i] > OVER_IDLE * idle && speed[i] > LEAST_M_S;
-        turns.then(|| (rpm[i] / speed[i]).ln())
-    };
-    let last = speed.len().saturating_sub(1);
-    let around = |i: usize| [i.saturating_sub(SHIFT_MARGIN), i, (i + SHIFT_MARGIN).min(last)];
-    (0..speed.len())
-        .map(|i| {
-            let [Some(before), Some(now), Some(after)] = around(i).map(ratio) else { return false };
-            (now - before).abs() < RESTS_FRAC && (after - now).abs() < RESTS_FRAC
-        })
-        .collect()
 }
 
 fn unwrap(angle: &mut [f64]) {

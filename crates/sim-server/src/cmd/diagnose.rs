@@ -3,13 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
-use diagnosis::{DriveSet, Options, Request, Threads};
+use diagnosis::{DriveSet, Options, Request};
 use dynamics::TruckParameters;
 
 use crate::failure::Failure;
 use crate::out_folder::{Out, OutFolder};
 use crate::output;
 use crate::progress::Stages;
+use crate::threads::Threads;
 
 mod example;
 pub(crate) mod folder;

@@ -4,8 +4,8 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Subcommand;
+use diagnosis::DriveSet;
 use diagnosis::experiment::{Experiment, Known, NOTHING, Pair, Suggestion, suggest};
-use diagnosis::{DriveSet, Threads};
 use dynamics::TruckParameters;
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +15,7 @@ use crate::out_folder::Out;
 use crate::output;
 use crate::progress::Stages;
 use crate::provenance::Provenance;
+use crate::threads::Threads;
 
 /// Manoeuvres that are listed beside the plan.
 const LISTED: usize = 5;

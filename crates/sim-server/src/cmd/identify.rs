@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Parser;
+use diagnosis::Finding;
 use diagnosis::identify::{Correlated, Identification, Identified, NotTold, identify};
-use diagnosis::{Finding, Threads};
 use dynamics::TruckParameters;
 use serde::Serialize;
 
@@ -14,6 +14,7 @@ use crate::out_folder::Out;
 use crate::output;
 use crate::progress::Stages;
 use crate::provenance::{GIT_REVISION, Provenance, VERSION};
+use crate::threads::Threads;
 
 /// What is written, beside drives that are made.
 const RESULTS: &[&str] = &["identify.json", "*.identified.toml"];

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use diagnosis::fidelity::{DriveFidelity, Replayed, SignalFidelity, fidelity};
-use diagnosis::{Threads, collect, read_traces, whole_run};
+use diagnosis::{collect, read_traces, whole_run};
 use dynamics::TruckParameters;
 use serde::Serialize;
 
@@ -15,6 +15,7 @@ use crate::output;
 use crate::picture::{Line, Strip, Style, page};
 use crate::progress::Stages;
 use crate::provenance::Provenance;
+use crate::threads::Threads;
 
 /// Drives the truck model with the measured inputs and compares its outputs with the measured
 /// ones. Writes fidelity.json and a picture, replay.html.

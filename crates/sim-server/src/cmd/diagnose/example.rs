@@ -7,8 +7,8 @@
 
 use std::sync::Arc;
 
+use diagnosis::collect;
 use diagnosis::logger::Draw;
-use diagnosis::{Threads, collect};
 use dynamics::catalogue::{Cause, Estimate, cause};
 use dynamics::{Overlay, TruckModel, TruckParameters};
 use road::Road;
@@ -20,6 +20,7 @@ use super::logger::drive;
 use crate::failure::Failure;
 use crate::out_folder::OutFolder;
 use crate::provenance::Provenance;
+use crate::threads::Threads;
 
 /// Truck of the example.
 pub(super) const TRUCK: &str = "reference";

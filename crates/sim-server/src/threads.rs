@@ -1,18 +1,19 @@
-//! The jobs on the machine's cores: an executor that shells share. The diagnosis itself never uses it.
+//! The jobs of a diagnosis on the machine's cores. The diagnosis itself starts no threads; its shells,
+//! the Python package among them, share this file.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::Executor;
+use diagnosis::Executor;
 
 /// As many threads as there are cores.
 #[derive(Debug, Clone, Copy)]
-pub struct Threads(usize);
+pub(crate) struct Threads(usize);
 
 impl Threads {
     /// For this machine.
     #[must_use]
-    pub fn available() -> Self {
+    pub(crate) fn available() -> Self {
         Self(std::thread::available_parallelism().map_or(1, NonZeroUsize::get))
     }
 }
