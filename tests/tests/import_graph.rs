@@ -22,19 +22,21 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("traffic-client", vec!["tractrix-core", "road", "driver-models"]),
         ("tractrix-j1939", vec!["tractrix-core"]),
         ("recording", vec!["tractrix-core", "road"]),
+        ("ros2", vec!["recording"]),
         ("sim", plant.clone()),
         ("diagnosis", vec!["tractrix-core", "road", "dynamics", "tractrix-j1939"]),
         ("truck-node", vec!["tractrix-core", "road", "planner", "tractrix-j1939", "recording"]),
         ("tractrix-python", [&plant[..], &["sim", "diagnosis"]].concat()),
-        ("sim-server", [plant, vec!["sim", "diagnosis", "recording"]].concat()),
+        ("sim-server", [plant, vec!["sim", "diagnosis", "recording", "ros2"]].concat()),
     ])
 }
 
 /// Third-party crates that only one room may know.
-const ONLY: [(&str, &[&str]); 6] = [
+const ONLY: [(&str, &[&str]); 7] = [
     ("tokio", &["sim-server"]),
     ("axum", &["sim-server"]),
     ("mcap", &["recording"]),
+    ("ros2-client", &["ros2"]),
     ("pyo3", &["tractrix-python"]),
     ("clarabel", &["planner"]),
     ("socketcan", &["tractrix-j1939"]),

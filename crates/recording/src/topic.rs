@@ -25,6 +25,8 @@ pub struct Topic {
     pub type_name: &'static str,
     /// Whether a late subscriber gets the last message (QoS transient local).
     pub is_latched: bool,
+    /// Messages per second of simulation time, about; of what comes once or now and then 1.
+    pub usual_rate_hz: u16,
     definition: &'static str,
 }
 
@@ -53,14 +55,14 @@ pub(crate) struct TopicOf<M> {
 }
 
 impl<M: Message> TopicOf<M> {
-    const fn new(name: &'static str) -> Self {
-        let topic =
-            Topic { name, type_name: M::NAME, is_latched: false, definition: M::DEFINITION };
+    const fn new(name: &'static str, usual_rate_hz: u16) -> Self {
+        let (type_name, definition) = (M::NAME, M::DEFINITION);
+        let topic = Topic { name, type_name, is_latched: false, usual_rate_hz, definition };
         Self { topic, message: PhantomData }
     }
 
     const fn latched(name: &'static str) -> Self {
-        let mut of = Self::new(name);
+        let mut of = Self::new(name, 1);
         of.topic.is_latched = true;
         of
     }
@@ -83,27 +85,31 @@ impl<M: Message> TopicOf<M> {
     }
 }
 
+/// Rates of what comes with every tick and with the scene, 1/s.
+const TICK_HZ: u16 = 100;
+const SCENE_HZ: u16 = 10;
+
 /// Frames that do not change during a run.
 pub(crate) const STATIC_FRAMES: TopicOf<TfMessage> = TopicOf::latched("/tf_static");
 /// Latitude and longitude; only where the road has a geo reference.
-pub(crate) const FIX: TopicOf<NavSatFix> = TopicOf::new("/fix");
-pub(crate) const CLOCK: TopicOf<Clock> = TopicOf::new("/clock");
-pub(crate) const FRAMES: TopicOf<TfMessage> = TopicOf::new("/tf");
-pub(crate) const ODOMETRY: TopicOf<Odometry> = TopicOf::new("/odom");
-pub(crate) const IMU: TopicOf<Imu> = TopicOf::new("/imu");
-pub(crate) const DIAGNOSTICS: TopicOf<DiagnosticArray> = TopicOf::new("/diagnostics");
-pub(crate) const TRUCK: TopicOf<TruckState> = TopicOf::new("/truck/state");
-pub(crate) const PLAN: TopicOf<PlanState> = TopicOf::new("/truck/plan");
-pub(crate) const PATH: TopicOf<Path> = TopicOf::new("/plan/path");
-pub(crate) const SCENE: TopicOf<Scene> = TopicOf::new("/scene");
-pub(crate) const MARKERS: TopicOf<MarkerArray> = TopicOf::new("/markers");
+pub(crate) const FIX: TopicOf<NavSatFix> = TopicOf::new("/fix", SCENE_HZ);
+pub(crate) const CLOCK: TopicOf<Clock> = TopicOf::new("/clock", TICK_HZ);
+pub(crate) const FRAMES: TopicOf<TfMessage> = TopicOf::new("/tf", TICK_HZ);
+pub(crate) const ODOMETRY: TopicOf<Odometry> = TopicOf::new("/odom", TICK_HZ);
+pub(crate) const IMU: TopicOf<Imu> = TopicOf::new("/imu", TICK_HZ);
+pub(crate) const DIAGNOSTICS: TopicOf<DiagnosticArray> = TopicOf::new("/diagnostics", 1);
+pub(crate) const TRUCK: TopicOf<TruckState> = TopicOf::new("/truck/state", TICK_HZ);
+pub(crate) const PLAN: TopicOf<PlanState> = TopicOf::new("/truck/plan", TICK_HZ);
+pub(crate) const PATH: TopicOf<Path> = TopicOf::new("/plan/path", SCENE_HZ);
+pub(crate) const SCENE: TopicOf<Scene> = TopicOf::new("/scene", SCENE_HZ);
+pub(crate) const MARKERS: TopicOf<MarkerArray> = TopicOf::new("/markers", SCENE_HZ);
 pub(crate) const LANES: TopicOf<MarkerArray> = TopicOf::latched("/road/lanes");
-pub(crate) const LIMITS: TopicOf<StackLimits> = TopicOf::new("/stack/limits");
-pub(crate) const VEHICLES: TopicOf<StackScene> = TopicOf::new("/stack/scene");
-pub(crate) const INPUT: TopicOf<StackInput> = TopicOf::new("/stack/input");
+pub(crate) const LIMITS: TopicOf<StackLimits> = TopicOf::new("/stack/limits", TICK_HZ);
+pub(crate) const VEHICLES: TopicOf<StackScene> = TopicOf::new("/stack/scene", TICK_HZ);
+pub(crate) const INPUT: TopicOf<StackInput> = TopicOf::new("/stack/input", TICK_HZ);
 /// Of a drive over a bus; `BUS` stands for its name.
-pub(crate) const CAN_FRAMES: TopicOf<CanFrame> = TopicOf::new("/can/BUS/frames");
-pub(crate) const CAN_TICKS: TopicOf<BusTick> = TopicOf::new("/can/BUS/ticks");
+pub(crate) const CAN_FRAMES: TopicOf<CanFrame> = TopicOf::new("/can/BUS/frames", TICK_HZ);
+pub(crate) const CAN_TICKS: TopicOf<BusTick> = TopicOf::new("/can/BUS/ticks", TICK_HZ);
 
 /// Every topic, in the order in which a file opens them.
 pub const TOPICS: [Topic; 16] = [

@@ -1,19 +1,22 @@
 //! The main program of Tractrix: command line, dashboard, recording.
 //!
-//! One file per command under `cmd/`. A run's world lives in its own thread ([`driver`]); the
-//! recording and the viewers get its ticks over bounded channels, lossless to the recording, lossy
-//! to viewers. Only this crate knows an async runtime.
+//! One file per command under `cmd/`. A run's world lives in its own thread ([`session`]), and is
+//! commanded through one door; the recording and the viewers get its ticks over bounded channels,
+//! lossless to the recording, lossy to viewers. Only this crate knows an async runtime.
 
 mod cli;
 mod cmd;
 mod dashboard;
-mod driver;
 mod failure;
+mod listeners;
 mod out_folder;
 mod output;
 mod picture;
 mod progress;
 mod provenance;
+#[cfg(feature = "ros2")]
+mod ros2_node;
+mod session;
 mod signals;
 mod threads;
 

@@ -21,7 +21,7 @@ use support::program;
 struct Run {
     process: Child,
     address: String,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Run {
@@ -39,7 +39,7 @@ impl Run {
         BufReader::new(process.stderr.take().unwrap()).read_line(&mut line).unwrap();
         let address = line.split("http://").nth(1).unwrap_or_else(|| panic!("{line}"));
         let address = address.split_whitespace().next().unwrap().to_owned();
-        Self { process, address, _folder: folder }
+        Self { process, address, folder }
     }
 
     /// Status and body of a request.
@@ -70,6 +70,25 @@ impl Run {
 
     fn control(&self, body: &str) -> (u16, Value) {
         self.ask("POST", "/api/v1/control", "", body.as_bytes())
+    }
+
+    /// A command that acts.
+    fn act(&self, body: &str) -> Value {
+        let (status, answer) = self.control(body);
+        assert_eq!(status, 200, "{body}: {answer}");
+        answer
+    }
+
+    /// Waits until the program has ended, and reads a summary of its folder.
+    fn end(mut self, summary: &str) -> Value {
+        for _ in 0..600 {
+            if self.process.try_wait().unwrap().is_some() {
+                let text = std::fs::read(self.folder.path().join("out").join(summary)).unwrap();
+                return serde_json::from_slice(&text).unwrap();
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        panic!("it does not end")
     }
 
     /// The frame, once there is one.
@@ -121,7 +140,7 @@ fn a_pace_is_a_number_or_a_word() {
     let run = Run::start(&[]);
     for (pace, shown) in [("5", "5"), ("\"7\"", "7"), ("\"realtime\"", "realtime")] {
         let answer = run.control(&format!("{{\"action\": \"pace\", \"pace\": {pace}}}"));
-        assert_eq!(answer.0, 202, "{}", answer.1);
+        assert_eq!(answer.0, 200, "{}", answer.1);
         let taken = (0..300).any(|_| {
             std::thread::sleep(Duration::from_millis(50));
             run.state()["run"]["pace"] == shown
@@ -130,12 +149,12 @@ fn a_pace_is_a_number_or_a_word() {
     }
 }
 
-/// A wish for a lane change was answered with 202 and dropped where nobody takes wishes.
+/// A wish for a lane change was answered and dropped where nobody takes wishes.
 #[test]
 fn a_lane_change_is_taken_only_where_the_decider_is_external() {
     let wish = r#"{"action": "lane_change", "to": "left"}"#;
     refused(&Run::start(&[]).control(wish), 409, "no_external_decider", "--decider external");
-    assert_eq!(Run::start(&["--decider", "external"]).control(wish).0, 202);
+    assert_eq!(Run::start(&["--decider", "external"]).control(wish).0, 200);
 }
 
 /// A page that stays open must see that another run has taken the port.
@@ -149,4 +168,70 @@ fn each_run_has_an_id_of_its_own() {
     a.control(r#"{"action": "pace", "pace": "max"}"#);
     let (_, summary) = a.ask("GET", "/api/v1/summary", "", b"");
     assert_eq!(summary["schema"], 1);
+}
+
+/// A client drives a run tick by tick, changes the set speed on the way, and gets the bits of the
+/// same run without a server; each reset has a recording of its own.
+#[test]
+fn a_run_in_lockstep_has_the_bits_of_the_same_run_alone() {
+    let run = Run::start(&["--pace", "max"]);
+    let first = run.state()["run_id"].clone();
+    run.act(r#"{"action": "pause"}"#);
+    let began = run.act(r#"{"action": "reset", "seed": 7}"#);
+    assert_eq!((&began["tick"], &began["state"]), (&0.into(), &"paused".into()), "{began}");
+    let stepped = run.act(r#"{"action": "step", "ticks": 300, "wait": true}"#);
+    assert_eq!((&stepped["tick"], &stepped["state"]), (&300.into(), &"paused".into()));
+    run.act(r#"{"action": "set_speed", "speed_m_s": 15.5}"#);
+    let stepped = run.act(r#"{"action": "step_until", "time_s": 20.0, "wait": true}"#);
+    assert_eq!((&stepped["tick"], &stepped["time_s"]), (&2000.into(), &20.0.into()));
+    assert_eq!(run.act(r#"{"action": "step_until", "time_s": 3, "wait": true}"#)["tick"], 2000);
+    assert_ne!(run.state()["run_id"], first, "a page sees that another run has begun");
+    let summary = {
+        assert_eq!(run.act(r#"{"action": "quit"}"#)["state"], "quitting");
+        let one = run.folder.path().join("out");
+        assert!(one.join("summary.json").exists() && one.join("run.mcap").exists());
+        run.end("run-2/summary.json")
+    };
+    let scenario = sim::Scenario::builtin("flat").unwrap();
+    let mut alone = sim::World::new(&scenario, 7).unwrap();
+    for tick in 0..2000 {
+        if tick == 300 {
+            alone.stack_mut().set_speed(15.5);
+        }
+        alone.tick(&mut ()).unwrap();
+    }
+    assert_eq!(summary["state_hash"], alone.summary().state_hash.as_str());
+}
+
+#[test]
+fn commands_in_a_wrong_state_are_refused_with_what_they_need() {
+    let run = Run::start(&["--duration", "3", "--pace", "max"]);
+    let step = r#"{"action": "step", "ticks": 10, "wait": true}"#;
+    let ended = (0..600).any(|_| {
+        std::thread::sleep(Duration::from_millis(50));
+        run.state()["run"]["state"] == "finished"
+    });
+    assert!(ended);
+    refused(&run.control(step), 409, "run_ended", "has ended");
+    let stopped = run.act(r#"{"action": "stop"}"#);
+    assert_eq!((&stopped["state"], &stopped["tick"]), (&"stopped".into(), &0.into()));
+    refused(&run.control(step), 409, "wrong_state", "pause it first");
+    assert_eq!(run.act(r#"{"action": "pause"}"#)["state"], "paused");
+    assert_eq!(run.act(step)["tick"], 10);
+    let far = r#"{"action": "step_until", "time_s": 1e9, "wait": true}"#;
+    refused(&run.control(far), 422, "too_far", "at most 1000000");
+    run.act(r#"{"action": "pace", "pace": 0.01}"#);
+    std::thread::scope(|scope| {
+        let waiting =
+            scope.spawn(|| run.control(r#"{"action": "step", "ticks": 90, "wait": true}"#));
+        let steps = (0..600).any(|_| {
+            std::thread::sleep(Duration::from_millis(20));
+            (0.105..1.0).contains(&run.state()["time_s"].as_f64().unwrap())
+        });
+        assert!(steps);
+        let second = r#"{"action": "step", "ticks": 1}"#;
+        refused(&run.control(second), 409, "wrong_state", "let a step end");
+        run.act(r#"{"action": "play"}"#);
+        refused(&waiting.join().unwrap(), 409, "cut_short", "were not driven");
+    });
 }

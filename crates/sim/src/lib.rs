@@ -49,6 +49,7 @@ mod lead;
 mod memory;
 mod metrics;
 mod off_road;
+mod outside;
 mod overrides;
 mod plant;
 mod plant_pose;

@@ -6,11 +6,13 @@ use clap::Parser;
 use clap::builder::RangedU64ValueParser;
 
 use crate::cli::positive;
-use crate::driver::Pace;
 use crate::failure::Failure;
+use crate::session::Pace;
 
 mod execute;
 mod options;
+mod report;
+mod runs;
 
 /// Drives a scenario in closed loop, with a live dashboard, and records it.
 #[derive(Debug, Parser)]
@@ -82,7 +84,8 @@ pub(crate) struct Args {
     /// Prints the summary as one JSON object, and nothing else, on stdout.
     #[arg(long)]
     json: bool,
-    /// ROS 2 topics; not supported yet.
+    /// Shows the run as a node of the ROS 2 domain ROS_DOMAIN_ID, and takes commands from it; on
+    /// this machine alone unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET. Nobody is authenticated.
     #[arg(long)]
     ros2: bool,
     /// Foxglove WebSocket; not supported yet.

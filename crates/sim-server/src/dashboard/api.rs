@@ -1,7 +1,7 @@
 //! `/api/v1/`: state, summary, road, health and control as JSON.
 
 use std::sync::Arc;
-use std::sync::mpsc::TrySendError;
+use std::time::Duration;
 
 use axum::body::Bytes;
 use axum::extract::State;
@@ -10,9 +10,9 @@ use axum::http::{Method, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 use super::Shared;
-use crate::driver::Control;
 use crate::failure::one_line;
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
+use crate::session::{self, Acted, Command, Handle, Refused, Wish};
 
 fn json(status: StatusCode, body: String) -> Response {
     (status, [(header::CONTENT_TYPE, "application/json")], body).into_response()
@@ -64,7 +64,7 @@ pub(super) async fn summary(State(shared): State<Arc<Shared>>) -> Response {
 
 /// The road's geometry and the truck's lengths.
 pub(super) async fn road(State(shared): State<Arc<Shared>>) -> Response {
-    json(StatusCode::OK, shared.road.to_string())
+    json(StatusCode::OK, shared.setting().road.to_string())
 }
 
 /// Says that the server answers.
@@ -75,27 +75,69 @@ pub(super) async fn health() -> Response {
     json(StatusCode::OK, body.to_string())
 }
 
-/// Hands a control to the world's thread.
+/// Carries out a command, between two ticks; a step with `"wait": true` is answered when it is
+/// driven.
 pub(super) async fn control(
     State(shared): State<Arc<Shared>>,
     body: Result<Bytes, BytesRejection>,
 ) -> Response {
     let Ok(body) = body else { return body_not_read() };
-    let control = match Control::from_json(&body) {
-        Ok(control) => control,
+    let wish = match Wish::from_json(&body) {
+        Ok(wish) => wish,
         Err(e) => return error(StatusCode::BAD_REQUEST, e.code(), &e.to_string()),
     };
-    if matches!(control, Control::LaneChange { .. }) && !shared.external_decider {
-        let why = "the run decides on lane changes itself; start it with --decider external";
-        return error(StatusCode::CONFLICT, "no_external_decider", why);
-    }
-    match shared.controls.try_send(control) {
-        Ok(()) => json(StatusCode::ACCEPTED, format!("{{\"schema\":{SCHEMA}}}")),
-        Err(TrySendError::Full(_)) => {
-            error(StatusCode::TOO_MANY_REQUESTS, "too_many_controls", "too many controls at once")
+    let answered = tokio::time::timeout(LONGEST_WAIT, carry_out(shared.handle.clone(), wish));
+    match answered.await {
+        Ok(Ok(acted)) => {
+            let mut body = serde_json::json!({ "schema": SCHEMA });
+            if let (Some(body), Ok(serde_json::Value::Object(acted))) =
+                (body.as_object_mut(), serde_json::to_value(acted))
+            {
+                body.extend(acted);
+            }
+            json(StatusCode::OK, body.to_string())
         }
-        Err(TrySendError::Disconnected(_)) => {
-            error(StatusCode::CONFLICT, "run_ended", "the run has ended")
+        Ok(Err(why)) => refusal(&why),
+        Err(_) => {
+            let why = "the session has not answered; what was asked for may still act";
+            error(StatusCode::GATEWAY_TIMEOUT, "no_answer", why)
         }
     }
+}
+
+/// A million ticks at the speed of a slow machine.
+const LONGEST_WAIT: Duration = Duration::from_secs(600);
+
+async fn carry_out(handle: Handle, wish: Wish) -> Result<Acted, Refused> {
+    let command = match wish {
+        Wish::Command(command) => command,
+        Wish::Reset { seed } => restart(handle.clone(), seed, None).await?,
+        Wish::Stop => restart(handle.clone(), None, Some(session::State::Stopped)).await?,
+    };
+    handle.ask(command).await
+}
+
+/// A world is built where nobody waits.
+async fn restart(
+    handle: Handle,
+    seed: Option<u64>,
+    state: Option<session::State>,
+) -> Result<Command, Refused> {
+    let built = tokio::task::spawn_blocking(move || handle.reset(seed, state)).await;
+    built.unwrap_or_else(|e| Err(Refused::Unusable(e.to_string())))
+}
+
+fn refusal(why: &Refused) -> Response {
+    let (status, code) = match why {
+        Refused::TooMany => (StatusCode::TOO_MANY_REQUESTS, "too_many_controls"),
+        Refused::Ended => (StatusCode::CONFLICT, "run_ended"),
+        Refused::WrongState { .. } => (StatusCode::CONFLICT, "wrong_state"),
+        Refused::NoExternalDecider => (StatusCode::CONFLICT, "no_external_decider"),
+        Refused::OutsideBus(_) => (StatusCode::CONFLICT, "outside_bus"),
+        Refused::OneSumo => (StatusCode::CONFLICT, "one_sumo"),
+        Refused::CutShort { .. } => (StatusCode::CONFLICT, "cut_short"),
+        Refused::TooFar { .. } => (StatusCode::UNPROCESSABLE_ENTITY, "too_far"),
+        Refused::Unusable(_) => (StatusCode::UNPROCESSABLE_ENTITY, "unusable"),
+    };
+    error(status, code, &why.to_string())
 }

@@ -10,8 +10,8 @@ use tractrix_core::{
 
 use super::ahead::{Lead, SpeedAhead};
 use super::strip::round;
-use crate::driver::{Pace, RunState};
 use crate::provenance::Provenance;
+use crate::session::{Pace, RunState};
 
 /// The frame sent to viewers and answered by `/api/v1/state`.
 #[derive(Debug, Serialize)]

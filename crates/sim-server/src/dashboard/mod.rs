@@ -22,7 +22,7 @@ pub(crate) use publisher::Publisher;
 pub(crate) use server::{Dashboard, bind};
 
 use self::strip::Strip;
-use crate::driver::ControlSender;
+use crate::session::Handle;
 
 /// What the world's thread leaves for the viewers.
 pub(crate) struct Shared {
@@ -32,33 +32,42 @@ pub(crate) struct Shared {
     strip: Mutex<Strip>,
     /// The summary so far as JSON.
     summary: Mutex<Arc<str>>,
-    /// The road as JSON; does not change.
-    road: Arc<str>,
+    /// What does not change during a run.
+    setting: Mutex<Setting>,
+    /// To the session.
+    handle: Handle,
+}
+
+/// What does not change during a run.
+#[derive(Clone)]
+pub(crate) struct Setting {
+    /// The road as JSON.
+    pub(crate) road: Arc<str>,
     /// The report of the diagnosis that the truck comes from, as a page.
-    report: Option<Arc<str>>,
-    /// Lane changes are wished from outside.
-    external_decider: bool,
-    /// To the world's thread.
-    controls: ControlSender,
+    pub(crate) report: Option<Arc<str>>,
 }
 
 impl Shared {
     /// Nothing published yet.
-    pub(crate) fn new(
-        road_json: String,
-        report: Option<String>,
-        external_decider: bool,
-        controls: ControlSender,
-    ) -> Arc<Self> {
+    pub(crate) fn new(setting: Setting, handle: Handle) -> Arc<Self> {
         Arc::new(Self {
             frame: watch::Sender::new(Arc::from("")),
             strip: Mutex::default(),
             summary: Mutex::new(Arc::from("{}")),
-            road: road_json.into(),
-            report: report.map(Arc::from),
-            external_decider,
-            controls,
+            setting: Mutex::new(setting),
+            handle,
         })
+    }
+
+    /// Another run begins: what is left of the former one goes.
+    pub(crate) fn begin(&self, setting: Setting) {
+        *self.setting.lock().unwrap_or_else(PoisonError::into_inner) = setting;
+        *self.strip() = Strip::default();
+        *self.summary() = Arc::from("{}");
+    }
+
+    fn setting(&self) -> Setting {
+        self.setting.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     fn strip(&self) -> MutexGuard<'_, Strip> {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use planner::decider::DeciderKind;
 use road::Road;
 use serde::Serialize;
 use sim::{GhostReport, Scenario, Summary, World};
@@ -12,8 +13,8 @@ use super::Shared;
 use super::ahead::{Lead, SpeedAhead};
 use super::frame::{Ego, Frame, GhostHere, Here, Other, Planned, Refused, Run, Snapshot};
 use super::strip::round;
-use crate::driver::{Pace, RunState};
 use crate::provenance::Provenance;
+use crate::session::{Pace, RunState};
 
 /// Turns ticks into frames; lives in the world's thread.
 pub(crate) struct Publisher {
@@ -21,6 +22,7 @@ pub(crate) struct Publisher {
     provenance: Provenance,
     run_id: String,
     scenario: String,
+    external_decider: bool,
     road: Arc<Road>,
     snapshot: Option<Snapshot>,
     /// Wall and simulated seconds of an earlier frame, for the factor.
@@ -56,6 +58,7 @@ impl Publisher {
             provenance,
             run_id,
             scenario: scenario.name.clone(),
+            external_decider: scenario.stack.decider == DeciderKind::External,
             road,
             snapshot: None,
             mark: (0.0, 0.0),
@@ -80,7 +83,7 @@ impl Publisher {
             run: Run {
                 scenario: &self.scenario,
                 state,
-                external_decider: self.shared.external_decider,
+                external_decider: self.external_decider,
                 pace,
                 realtime_factor: round(self.realtime_factor, 100.0),
                 distance_m: round(summary.distance_m, 10.0),

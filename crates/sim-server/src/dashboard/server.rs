@@ -67,13 +67,14 @@ fn router(shared: Arc<Shared>) -> Router {
 }
 
 async fn page(State(shared): State<Arc<Shared>>, uri: Uri) -> Response {
-    assets::asset(uri.path(), shared.report.is_some()).unwrap_or_else(|| api::not_found(uri.path()))
+    assets::asset(uri.path(), shared.setting().report.is_some())
+        .unwrap_or_else(|| api::not_found(uri.path()))
 }
 
 /// The report of the diagnosis that the truck comes from.
 async fn report(State(shared): State<Arc<Shared>>) -> Response {
     let page = |text: &Arc<str>| Html(text.to_string()).into_response();
-    shared.report.as_ref().map_or_else(|| api::not_found("/report"), page)
+    shared.setting().report.as_ref().map_or_else(|| api::not_found("/report"), page)
 }
 
 /// Refuses requests that another web site makes through the user's browser: a foreign `Host`

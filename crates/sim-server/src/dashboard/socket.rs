@@ -75,7 +75,7 @@ impl Viewer {
         let first = self.rows_sent;
         let rows = {
             let strip = self.shared.strip();
-            if strip.len() == first {
+            if strip.len() <= first {
                 return true;
             }
             strip.rows_from(first)

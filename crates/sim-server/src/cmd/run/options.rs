@@ -36,7 +36,8 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
 
 /// What the contract names and this version does not do.
 fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
-    for (asked, flag) in [(args.ros2, "--ros2"), (args.foxglove, "--foxglove")] {
+    let ros2 = args.ros2 && cfg!(not(feature = "ros2"));
+    for (asked, flag) in [(ros2, "--ros2"), (args.foxglove, "--foxglove")] {
         if asked {
             return Err(Failure::unsupported(flag));
         }

@@ -149,7 +149,10 @@ function selectPace(pace) {
 }
 
 const toggle = () => send({ action: frame?.run.state === "paused" ? "play" : "pause" });
-const step = () => send({ action: "step", ticks: 10 });
+const step = async () => {
+  if (frame?.run.state !== "paused") await send({ action: "pause" });
+  return send({ action: "step", ticks: 10 });
+};
 const change = (to) => send({ action: "lane_change", to });
 $("play").onclick = toggle;
 $("left").onclick = () => change("left");

@@ -1,0 +1,261 @@
+//! What a user may ask of a session. Commands act between two ticks.
+
+use planner::decider::LaneChoice;
+use serde_json::{Map, Value};
+
+use super::{Next, Pace};
+
+/// A command. As JSON: `{"action": "step", "ticks": 10}`, `{"action": "pace", "pace": "max"}`.
+pub(crate) enum Command {
+    /// Goes on at the present pace.
+    Play,
+    /// Stands still between two ticks.
+    Pause,
+    /// From pause to pause.
+    Step {
+        /// Number of ticks, 1 to [`MAX_TICKS`].
+        ticks: u32,
+        /// The answer comes when they are driven, not when they begin.
+        wait: bool,
+    },
+    /// From pause to pause, to the first tick at or behind a time.
+    StepUntil {
+        /// Simulation time, s.
+        time_s: f64,
+        /// As with [`Self::Step`].
+        wait: bool,
+    },
+    /// Changes the pace.
+    Pace(Pace),
+    /// Wishes a lane change (decider `external`); the safety gate decides.
+    LaneChange {
+        /// Which way.
+        to: LaneChoice,
+    },
+    /// The driver's set speed, m/s, 0 to 40.
+    SetSpeed(f64),
+    /// Ends the run and the session.
+    Quit,
+    /// Ends the run and begins another one.
+    Begin(Box<Next>),
+}
+
+/// What a text asks for: a command, or another world, which must be built first
+/// ([`super::Handle::reset`]).
+pub(crate) enum Wish {
+    /// To be sent as it is.
+    Command(Command),
+    /// Back to the start.
+    Reset {
+        /// Another seed.
+        seed: Option<u64>,
+    },
+    /// Back to the start, standing still.
+    Stop,
+}
+
+/// Ticks of one command, at most.
+pub(crate) const MAX_TICKS: u32 = 1_000_000;
+
+/// Why a text is no command, in words that name the key and its values.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum CommandError {
+    #[error("the body is not a JSON object like {{\"action\": \"pause\"}}")]
+    NotAnObject,
+    #[error(
+        "unknown action {0}; there are play, pause, step, step_until, reset, stop, pace, \
+         lane_change, set_speed and quit"
+    )]
+    UnknownAction(String),
+    #[error("{action} needs {key}: {values}")]
+    MissingKey { action: &'static str, key: &'static str, values: &'static str },
+    #[error("{key} = {value}: expected {values}")]
+    WrongValue { key: &'static str, value: String, values: &'static str },
+    #[error("{action} has no key {key:?}")]
+    UnknownKey { action: String, key: String },
+}
+
+impl CommandError {
+    /// A word for programs.
+    pub(crate) const fn code(&self) -> &'static str {
+        match self {
+            Self::NotAnObject => "not_an_object",
+            Self::UnknownAction(_) => "unknown_action",
+            Self::MissingKey { .. } => "missing_key",
+            Self::WrongValue { .. } => "wrong_value",
+            Self::UnknownKey { .. } => "unknown_key",
+        }
+    }
+}
+
+impl Wish {
+    /// Reads a wish from JSON.
+    ///
+    /// # Errors
+    /// [`CommandError`].
+    pub(crate) fn from_json(text: &[u8]) -> Result<Self, CommandError> {
+        let value: Value = serde_json::from_slice(text).map_err(|_| CommandError::NotAnObject)?;
+        let Value::Object(mut keys) = value else { return Err(CommandError::NotAnObject) };
+        let Some(action) = keys.remove("action") else { return Err(CommandError::NotAnObject) };
+        let wish = match action.as_str() {
+            Some("play") => Self::Command(Command::Play),
+            Some("pause") => Self::Command(Command::Pause),
+            Some("stop") => Self::Stop,
+            Some("quit") => Self::Command(Command::Quit),
+            Some("step") => {
+                let values = "a number of ticks from 1 to 1000000";
+                let ticks = |v: &Value| v.as_u64().and_then(|n| u32::try_from(n).ok());
+                let ticks = |v: &Value| ticks(v).filter(|n| (1..=MAX_TICKS).contains(n));
+                let ticks = take(&mut keys, "step", "ticks", values, ticks)?;
+                Self::Command(Command::Step { ticks, wait: take_wait(&mut keys)? })
+            }
+            Some("step_until") => {
+                let values = "a simulation time in seconds, zero or more";
+                let time_s = |v: &Value| v.as_f64().filter(|t| *t >= 0.0 && t.is_finite());
+                let time_s = take(&mut keys, "step_until", "time_s", values, time_s)?;
+                Self::Command(Command::StepUntil { time_s, wait: take_wait(&mut keys)? })
+            }
+            Some("reset") => {
+                let seed = take_optional(&mut keys, "seed", SEEDS, Value::as_u64)?;
+                Self::Reset { seed }
+            }
+            Some("set_speed") => {
+                let values = "a speed in m/s from 0 to 40";
+                let speed = |v: &Value| v.as_f64().filter(|v| (0.0..=40.0).contains(v));
+                let speed_m_s = take(&mut keys, "set_speed", "speed_m_s", values, speed)?;
+                Self::Command(Command::SetSpeed(speed_m_s))
+            }
+            Some("pace") => {
+                let pace = take(&mut keys, "pace", "pace", Pace::VALUES, |v| match v {
+                    Value::String(text) => text.parse().ok(),
+                    Value::Number(factor) => factor.to_string().parse().ok(),
+                    _ => None,
+                })?;
+                Self::Command(Command::Pace(pace))
+            }
+            Some("lane_change") => {
+                let to = |v: &Value| serde_json::from_value(v.clone()).ok();
+                let values = "left, right or keep";
+                let to = take(&mut keys, "lane_change", "to", values, to)?;
+                Self::Command(Command::LaneChange { to })
+            }
+            _ => return Err(CommandError::UnknownAction(action.to_string())),
+        };
+        match keys.into_iter().next() {
+            Some((key, _)) => Err(CommandError::UnknownKey { action: action.to_string(), key }),
+            None => Ok(wish),
+        }
+    }
+}
+
+const SEEDS: &str = "a whole number from 0 to 18446744073709551615";
+
+/// Takes the value of a key out of a command.
+fn take<T>(
+    keys: &mut Map<String, Value>,
+    action: &'static str,
+    key: &'static str,
+    values: &'static str,
+    read: impl FnOnce(&Value) -> Option<T>,
+) -> Result<T, CommandError> {
+    take_optional(keys, key, values, read)?.ok_or(CommandError::MissingKey { action, key, values })
+}
+
+/// As [`take`], of a key that may be missing.
+fn take_optional<T>(
+    keys: &mut Map<String, Value>,
+    key: &'static str,
+    values: &'static str,
+    read: impl FnOnce(&Value) -> Option<T>,
+) -> Result<Option<T>, CommandError> {
+    let Some(value) = keys.remove(key) else { return Ok(None) };
+    match read(&value) {
+        Some(read) => Ok(Some(read)),
+        None => Err(CommandError::WrongValue { key, value: value.to_string(), values }),
+    }
+}
+
+/// Whether the answer waits for the end.
+fn take_wait(keys: &mut Map<String, Value>) -> Result<bool, CommandError> {
+    let wait = take_optional(keys, "wait", "true or false", Value::as_bool)?;
+    Ok(wait.unwrap_or(false))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Wish, CommandError> {
+        Wish::from_json(text.as_bytes())
+    }
+
+    #[test]
+    fn commands_are_read_from_json() {
+        use Command as C;
+        type Is = fn(&Wish) -> bool;
+        use Wish as W;
+        let cases: [(&str, Is); 14] = [
+            (r#"{"action":"play"}"#, |c| matches!(c, W::Command(C::Play))),
+            (r#"{"action":"pause"}"#, |c| matches!(c, W::Command(C::Pause))),
+            (r#"{"action":"stop"}"#, |c| matches!(c, W::Stop)),
+            (r#"{"action":"quit"}"#, |c| matches!(c, W::Command(C::Quit))),
+            (r#"{"action":"step","ticks":3}"#, |c| {
+                matches!(c, W::Command(C::Step { ticks: 3, wait: false }))
+            }),
+            (r#"{"action":"step","ticks":3,"wait":true}"#, |c| {
+                matches!(c, W::Command(C::Step { ticks: 3, wait: true }))
+            }),
+            (r#"{"action":"step_until","time_s":2.5}"#, |c| {
+                matches!(c, W::Command(C::StepUntil { time_s: 2.5, wait: false }))
+            }),
+            (r#"{"action":"reset"}"#, |c| matches!(c, W::Reset { seed: None })),
+            (r#"{"action":"reset","seed":18446744073709551615}"#, |c| {
+                matches!(c, W::Reset { seed: Some(u64::MAX) })
+            }),
+            (r#"{"action":"set_speed","speed_m_s":20}"#, |c| {
+                matches!(c, W::Command(C::SetSpeed(20.0)))
+            }),
+            (r#"{"action":"pace","pace":"max"}"#, |c| matches!(c, W::Command(C::Pace(Pace::Max)))),
+            (r#"{"action":"pace","pace":0.5}"#, |c| {
+                matches!(c, W::Command(C::Pace(Pace::Factor(0.5))))
+            }),
+            (r#"{"pace":"2","action":"pace"}"#, |c| {
+                matches!(c, W::Command(C::Pace(Pace::Factor(2.0))))
+            }),
+            (r#"{"action":"lane_change","to":"left"}"#, |c| {
+                matches!(c, W::Command(C::LaneChange { to: LaneChoice::Left }))
+            }),
+        ];
+        for (text, is) in cases {
+            assert!(read(text).is_ok_and(|command| is(&command)), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_command_is_refused_with_a_code_and_in_our_own_words() {
+        for (text, code, words) in [
+            ("", "not_an_object", "JSON object"),
+            ("[1]", "not_an_object", "JSON object"),
+            ("{}", "not_an_object", "action"),
+            (r#"{"action":"fly"}"#, "unknown_action", "\"fly\"; there are play"),
+            (r#"{"action":7}"#, "unknown_action", "7"),
+            (r#"{"action":"step"}"#, "missing_key", "step needs ticks"),
+            (r#"{"action":"step","ticks":-1}"#, "wrong_value", "ticks = -1"),
+            (r#"{"action":"step","ticks":0}"#, "wrong_value", "ticks = 0"),
+            (r#"{"action":"step","ticks":1000001}"#, "wrong_value", "1 to 1000000"),
+            (r#"{"action":"step","ticks":1,"wait":1}"#, "wrong_value", "wait = 1"),
+            (r#"{"action":"step_until","time_s":-1}"#, "wrong_value", "time_s = -1"),
+            (r#"{"action":"reset","seed":18446744073709551616}"#, "wrong_value", "seed = "),
+            (r#"{"action":"set_speed","speed_m_s":41}"#, "wrong_value", "0 to 40"),
+            (r#"{"action":"pace","pace":"NaN"}"#, "wrong_value", "realtime, max or a factor"),
+            (r#"{"action":"pace","pace":0}"#, "wrong_value", "pace = 0"),
+            (r#"{"action":"pace","pace":true}"#, "wrong_value", "pace = true"),
+            (r#"{"action":"lane_change","to":"up"}"#, "wrong_value", "left, right or keep"),
+            (r#"{"action":"play","extra":1}"#, "unknown_key", "extra"),
+        ] {
+            let error = read(text).err().unwrap();
+            assert_eq!(error.code(), code, "{text}");
+            assert!(error.to_string().contains(words), "{text}: {error}");
+        }
+    }
+}

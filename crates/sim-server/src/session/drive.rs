@@ -1,0 +1,325 @@
+//! Driving a world: its thread's loop, with pacing, commands, recording and views.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+
+use planner::decider::DeciderKind;
+use recording::Recording;
+use sim::{EndReason, Status, TickTime, TickTimes, World};
+use tokio::sync::oneshot;
+use tractrix_core::{Recorder, Step, Tick};
+
+use super::pace::Pacer;
+use super::{Acted, Asked, Command, Handle, Next, Pace, Refused, RunState, State};
+use crate::dashboard::Publisher;
+use crate::failure::Failure;
+use crate::progress::Progress;
+
+/// A run about to start.
+pub(crate) struct Job {
+    pub(crate) world: World,
+    pub(crate) state: State,
+    pub(crate) pace: Pace,
+    pub(crate) recording: Recording,
+    pub(crate) publisher: Option<Publisher>,
+    pub(crate) handle: Handle,
+    pub(crate) asked: Receiver<Asked>,
+    pub(crate) stop: Arc<AtomicBool>,
+    pub(crate) progress: Progress,
+}
+
+/// A run that has ended.
+pub(crate) struct Ended {
+    pub(crate) world: World,
+    pub(crate) recording: Recording,
+    pub(crate) publisher: Option<Publisher>,
+    pub(crate) reason: EndReason,
+    /// What failed, when something did.
+    pub(crate) failure: Option<Failure>,
+    pub(crate) pace: Pace,
+    pub(crate) tick_time_us: TickTime,
+    pub(crate) missed_deadlines: u64,
+    pub(crate) wall_time_s: f64,
+    /// Where commands arrive.
+    pub(crate) asked: Option<Receiver<Asked>>,
+    /// What comes in its place, and who waits for it.
+    pub(crate) next: Option<(Box<Next>, Reply)>,
+    /// The session is to end too.
+    pub(crate) quits: bool,
+}
+
+/// Who waits for an answer.
+pub(crate) type Reply = oneshot::Sender<Result<Acted, Refused>>;
+
+/// Viewers get a frame this often (wall time).
+const FRAME_PERIOD: Duration = Duration::from_millis(50);
+
+/// The consumers of a tick.
+struct Sinks<'a> {
+    recording: &'a mut Recording,
+    publisher: Option<&'a mut Publisher>,
+    handle: &'a Handle,
+}
+
+impl Recorder for Sinks<'_> {
+    fn record(&mut self, tick: &Tick<'_>) {
+        self.recording.record(tick);
+        if let Some(publisher) = &mut self.publisher {
+            publisher.record(tick);
+        }
+        self.handle.note_bodies(tick);
+    }
+
+    fn step(&mut self, step: &Step<'_>) {
+        self.recording.step(step);
+    }
+}
+
+/// A run under way.
+pub(crate) struct Drive {
+    job: Job,
+    start: Instant,
+    pacer: Pacer,
+    times: TickTimes,
+    /// Ticks driven.
+    tick: u64,
+    /// Ticks to drive before the next pause.
+    steps: u64,
+    /// Who waits for that pause.
+    waiting: Option<Reply>,
+    frame_due: Duration,
+    next: Option<(Box<Next>, Reply)>,
+    quits: bool,
+}
+
+impl Drive {
+    #[expect(clippy::disallowed_methods, reason = "the shell owns the clock")]
+    pub(crate) fn new(job: Job) -> Self {
+        let tick_s = job.world.scenario().run.tick_s;
+        Self {
+            pacer: Pacer::new(job.pace, tick_s, Duration::ZERO),
+            start: Instant::now(),
+            times: TickTimes::new(),
+            tick: 0,
+            steps: 0,
+            waiting: None,
+            frame_due: Duration::ZERO,
+            next: None,
+            quits: false,
+            job,
+        }
+    }
+
+    /// Drives the world to its end, until it is stopped or replaced, or until it or the recording
+    /// fails.
+    pub(crate) fn run(mut self) -> Ended {
+        let mut failure = self.job.world.attach_ghost().map_err(Failure::work).err();
+        self.enter(self.job.state);
+        let reason = loop {
+            if failure.is_some() {
+                break EndReason::Failed;
+            }
+            while let Ok(asked) = self.job.asked.try_recv() {
+                self.act(asked);
+            }
+            if self.is_over() {
+                break EndReason::Interrupted;
+            }
+            let wait = if self.stands() {
+                FRAME_PERIOD
+            } else {
+                self.pacer.wait(self.start.elapsed()).min(FRAME_PERIOD)
+            };
+            if !wait.is_zero() {
+                if let Ok(asked) = self.job.asked.recv_timeout(wait) {
+                    self.act(asked);
+                }
+                if self.job.state != State::Playing {
+                    self.publish_if_due(RunState::Paused);
+                }
+                continue;
+            }
+            match self.drive_tick() {
+                Ok(status) => {
+                    if let Some(end) = status.end() {
+                        break end;
+                    }
+                }
+                Err(why) => {
+                    failure = Some(why);
+                    break EndReason::Failed;
+                }
+            }
+            let state = match self.job.state {
+                State::Playing => RunState::Running,
+                State::Stopped | State::Paused | State::Quitting => RunState::Paused,
+            };
+            self.publish_if_due(state);
+        };
+        self.enter(if self.quits { State::Quitting } else { State::Stopped });
+        self.answer_waiting();
+        self.frame_due = Duration::ZERO;
+        self.publish_if_due(RunState::Finished);
+        self.job.progress.finish();
+        Ended {
+            pace: self.pacer.pace(),
+            tick_time_us: self.times.tick_time_us(),
+            missed_deadlines: self.pacer.missed_deadlines(),
+            wall_time_s: self.start.elapsed().as_secs_f64(),
+            world: self.job.world,
+            recording: self.job.recording,
+            publisher: self.job.publisher,
+            reason,
+            failure,
+            asked: Some(self.job.asked),
+            next: self.next,
+            quits: self.quits,
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.quits || self.next.is_some() || self.job.stop.load(Ordering::Relaxed)
+    }
+
+    fn stands(&self) -> bool {
+        self.job.state != State::Playing && self.steps == 0
+    }
+
+    fn drive_tick(&mut self) -> Result<Status, Failure> {
+        let began = self.start.elapsed();
+        let mut sinks = Sinks {
+            recording: &mut self.job.recording,
+            publisher: self.job.publisher.as_mut(),
+            handle: &self.job.handle,
+        };
+        let status = self.job.world.tick(&mut sinks);
+        let ended = self.start.elapsed();
+        self.times.add(ended - began);
+        self.pacer.tick_ended(ended);
+        self.tick += 1;
+        self.steps = self.steps.saturating_sub(1);
+        if self.steps == 0 {
+            self.answer_waiting();
+        }
+        if self.job.recording.is_broken() {
+            return Err(Failure::Work("the recording cannot go on".to_owned()));
+        }
+        status.map_err(Failure::work)
+    }
+
+    /// What a command that has acted is answered with.
+    fn acted(&self) -> Acted {
+        let time_s = self.job.world.now().seconds();
+        Acted { tick: self.tick, time_s, state: self.job.state }
+    }
+
+    /// Who waits for the end of a step hears that it is driven, or how much of it is not.
+    fn answer_waiting(&mut self) {
+        if let Some(reply) = self.waiting.take() {
+            let left = self.steps;
+            let _ = reply.send(match left {
+                0 => Ok(self.acted()),
+                left => Err(Refused::CutShort { left }),
+            });
+        }
+    }
+
+    fn enter(&mut self, state: State) {
+        self.job.state = state;
+        self.job.handle.note_state(state);
+    }
+
+    /// Stands still, also in the middle of a step; who waits for its end is answered.
+    fn pause(&mut self) {
+        self.answer_waiting();
+        self.steps = 0;
+        self.enter(State::Paused);
+    }
+
+    fn act(&mut self, Asked { command, reply }: Asked) {
+        if self.is_over() {
+            let _ = reply.send(Err(Refused::Ended));
+            return;
+        }
+        let now = self.start.elapsed();
+        let done = match command {
+            Command::Play => {
+                self.pause();
+                self.enter(State::Playing);
+                self.pacer.restart(self.pacer.pace(), now);
+                Ok(())
+            }
+            Command::Pause => {
+                self.pause();
+                Ok(())
+            }
+            Command::Step { ticks, wait } => return self.step("step", ticks.into(), wait, reply),
+            Command::StepUntil { time_s, wait } => {
+                let left_s = time_s - self.job.world.now().seconds();
+                let ticks = (left_s / self.job.world.scenario().run.tick_s - 1e-6).ceil();
+                // A time that has passed is reached already
+                return self.step("step_until", ticks.max(0.0) as u64, wait, reply);
+            }
+            Command::Pace(pace) => {
+                self.pacer.restart(pace, now);
+                Ok(())
+            }
+            Command::LaneChange { to } => self.wish(to),
+            Command::SetSpeed(speed_m_s) => {
+                self.job.world.stack_mut().set_speed(speed_m_s);
+                Ok(())
+            }
+            Command::Quit => {
+                self.quits = true;
+                self.enter(State::Quitting);
+                Ok(())
+            }
+            Command::Begin(next) => {
+                self.next = Some((next, reply));
+                return;
+            }
+        };
+        let _ = reply.send(done.map(|()| self.acted()));
+    }
+
+    fn step(&mut self, action: &'static str, ticks: u64, wait: bool, reply: Reply) {
+        if self.job.state != State::Paused || self.steps > 0 {
+            let (state, needs) = (self.job.state, "pause it first, and let a step end");
+            let _ = reply.send(Err(Refused::WrongState { action, state, needs }));
+            return;
+        }
+        if ticks > super::command::MAX_TICKS.into() {
+            let _ = reply.send(Err(Refused::TooFar { ticks }));
+            return;
+        }
+        self.steps = ticks;
+        self.pacer.restart(self.pacer.pace(), self.start.elapsed());
+        if wait && ticks > 0 {
+            self.waiting = Some(reply);
+        } else {
+            let _ = reply.send(Ok(self.acted()));
+        }
+    }
+
+    fn wish(&mut self, to: planner::decider::LaneChoice) -> Result<(), Refused> {
+        if self.job.world.stack().config().decider != DeciderKind::External {
+            return Err(Refused::NoExternalDecider);
+        }
+        self.job.world.stack_mut().request_lane_change(to);
+        Ok(())
+    }
+
+    fn publish_if_due(&mut self, state: RunState) {
+        let now = self.start.elapsed();
+        if now < self.frame_due {
+            return;
+        }
+        self.frame_due = now + FRAME_PERIOD;
+        self.job.progress.show(&self.job.world);
+        if let Some(publisher) = &mut self.job.publisher {
+            publisher.publish(state, self.pacer.pace(), now, &self.job.world);
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The door to a session: commands in, answers out, and what can be seen without asking.
+
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use serde::Serialize;
+use sim::{Scenario, TrafficKind, World};
+use tokio::sync::oneshot;
+use tractrix_core::{EgoState, Neighbour, Time};
+
+use super::Command;
+
+/// Commands under way, at most.
+const QUEUE: usize = 64;
+
+/// The states of a session (those of `simulation_interfaces/msg/SimulationState`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum State {
+    /// At a run's start or behind its end.
+    Stopped,
+    /// Driving.
+    Playing,
+    /// Between two ticks.
+    Paused,
+    /// About to end.
+    Quitting,
+}
+
+/// What a viewer is told about the run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum RunState {
+    Running,
+    Paused,
+    Finished,
+}
+
+/// A command that has acted.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub(crate) struct Acted {
+    /// Ticks driven in this run.
+    pub(crate) tick: u64,
+    /// Simulation time, s.
+    pub(crate) time_s: f64,
+    /// The state that it left.
+    pub(crate) state: State,
+}
+
+/// Why a command did not act.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Refused {
+    #[error("too many commands at once")]
+    TooMany,
+    #[error("the run has ended")]
+    Ended,
+    #[error("{action} is not possible while the session is {state:?}: {needs}")]
+    WrongState { action: &'static str, state: State, needs: &'static str },
+    #[error("the run decides on lane changes itself; start it with --decider external")]
+    NoExternalDecider,
+    #[error("the truck behind {0} cannot be put back to its start")]
+    OutsideBus(String),
+    #[error("SUMO drives the traffic: its run cannot be reset, nor another one begun")]
+    OneSumo,
+    #[error("cut short: {left} ticks were not driven")]
+    CutShort { left: u64 },
+    #[error("{ticks} ticks away: a step is at most {}", super::command::MAX_TICKS)]
+    TooFar { ticks: u64 },
+    #[error("{0}")]
+    Unusable(String),
+}
+
+/// Another world in place of the present one.
+pub(crate) struct Next {
+    /// The world, at its start.
+    pub(crate) world: World,
+    /// Its seed.
+    pub(crate) seed: u64,
+    /// Where it begins: playing, paused or stopped.
+    pub(crate) state: State,
+}
+
+/// A command and who waits for its answer.
+pub(crate) struct Asked {
+    pub(crate) command: Command,
+    pub(crate) reply: oneshot::Sender<Result<Acted, Refused>>,
+}
+
+/// The bodies of the latest tick.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Bodies {
+    pub(crate) time: Time,
+    /// None before the first tick.
+    pub(crate) ego: Option<EgoState>,
+    pub(crate) others: Vec<Neighbour>,
+}
+
+/// What a session leaves for others to see.
+struct View {
+    state: State,
+    scenario: Arc<Scenario>,
+    seed: u64,
+    bodies: Bodies,
+}
+
+/// The door to a session.
+#[derive(Clone)]
+pub(crate) struct Handle {
+    queue: SyncSender<Asked>,
+    view: Arc<Mutex<View>>,
+    /// The bus outside that the truck is reached over: it has no way back to a start.
+    outside_bus: Option<Arc<str>>,
+}
+
+/// A session's door, and where its commands arrive.
+pub(crate) fn channel(
+    scenario: &Scenario,
+    seed: u64,
+    outside_bus: Option<&str>,
+) -> (Handle, Receiver<Asked>) {
+    let (queue, asked) = sync_channel(QUEUE);
+    let scenario = Arc::new(scenario.clone());
+    let view = View { state: State::Stopped, scenario, seed, bodies: Bodies::default() };
+    let outside_bus = outside_bus.map(Arc::from);
+    (Handle { queue, view: Arc::new(Mutex::new(view)), outside_bus }, asked)
+}
+
+impl Handle {
+    /// Sends a command; the answer comes when it has acted.
+    ///
+    /// # Errors
+    /// [`Refused`].
+    pub(crate) async fn ask(&self, command: Command) -> Result<Acted, Refused> {
+        let (reply, answer) = oneshot::channel();
+        self.queue.try_send(Asked { command, reply }).map_err(|e| match e {
+            TrySendError::Full(_) => Refused::TooMany,
+            TrySendError::Disconnected(_) => Refused::Ended,
+        })?;
+        answer.await.unwrap_or(Err(Refused::Ended))
+    }
+
+    /// The command that puts the present scenario back to its start, with the same seed or another
+    /// one, in the state in which it is or another one. The world is built here, by who asks: that
+    /// takes its time, and one that cannot be built changes nothing.
+    ///
+    /// # Errors
+    /// [`Refused`].
+    pub(crate) fn reset(
+        &self,
+        seed: Option<u64>,
+        state: Option<State>,
+    ) -> Result<Command, Refused> {
+        let (scenario, same, now) = {
+            let view = self.view();
+            (Arc::clone(&view.scenario), view.seed, view.state)
+        };
+        self.begin(&scenario, seed.unwrap_or(same), state.unwrap_or(now))
+    }
+
+    /// The command that begins another scenario. As [`Self::reset`].
+    ///
+    /// # Errors
+    /// [`Refused`].
+    pub(crate) fn begin(
+        &self,
+        scenario: &Scenario,
+        seed: u64,
+        state: State,
+    ) -> Result<Command, Refused> {
+        if let Some(bus) = &self.outside_bus {
+            return Err(Refused::OutsideBus(bus.to_string()));
+        }
+        let is_sumo = |scenario: &Scenario| scenario.traffic.source == TrafficKind::Sumo;
+        if is_sumo(scenario) || is_sumo(&self.scenario()) {
+            return Err(Refused::OneSumo);
+        }
+        let world = World::new(scenario, seed).map_err(|e| Refused::Unusable(e.to_string()))?;
+        Ok(Command::Begin(Box::new(Next { world, seed, state })))
+    }
+
+    /// The state now.
+    pub(crate) fn state(&self) -> State {
+        self.view().state
+    }
+
+    /// The scenario that is driven.
+    pub(crate) fn scenario(&self) -> Arc<Scenario> {
+        Arc::clone(&self.view().scenario)
+    }
+
+    /// The bodies of the latest tick.
+    pub(crate) fn bodies(&self) -> Bodies {
+        self.view().bodies.clone()
+    }
+
+    pub(crate) fn note_state(&self, state: State) {
+        self.view().state = state;
+    }
+
+    pub(crate) fn note_world(&self, world: &World, seed: u64) {
+        let mut view = self.view();
+        view.scenario = Arc::new(world.scenario().clone());
+        view.seed = seed;
+        view.bodies = Bodies::default();
+    }
+
+    pub(super) fn note_bodies(&self, tick: &tractrix_core::Tick<'_>) {
+        let bodies = &mut self.view().bodies;
+        bodies.time = tick.now;
+        bodies.ego = Some(*tick.ego);
+        bodies.others.clone_from(&tick.scene.neighbours);
+    }
+
+    fn view(&self) -> MutexGuard<'_, View> {
+        self.view.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

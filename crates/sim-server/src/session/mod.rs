@@ -1,0 +1,17 @@
+//! A session: worlds that are driven one after the other, and the one door through which page, API
+//! and ROS 2 command them.
+//!
+//! [`Drive`] owns a world and drives it in its own thread; everything else holds a [`Handle`]. A
+//! [`Command`] acts between two ticks and is answered ([`Acted`], [`Refused`]) once it has: the same
+//! commands at the same ticks give the same bits, whoever sends them. A reset is another world with
+//! a recording of its own; nothing is rewound.
+
+mod command;
+mod drive;
+mod handle;
+mod pace;
+
+pub(crate) use command::{Command, Wish};
+pub(crate) use drive::{Drive, Ended, Job, Reply};
+pub(crate) use handle::{Acted, Asked, Handle, Next, Refused, RunState, State, channel};
+pub(crate) use pace::Pace;

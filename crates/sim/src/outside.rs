@@ -1,0 +1,62 @@
+//! What of a scenario reaches out of the program: files that it reads, programs that it starts.
+
+use dynamics::TruckParameters;
+
+use crate::scenario::Scenario;
+use crate::traffic_section::SumoSection;
+
+impl Scenario {
+    /// Keys that name a file or a program, or give a program options. A scenario whose text comes
+    /// from a network should have none of them: it would read any file of this machine, and start
+    /// any program.
+    #[must_use]
+    pub fn reaches_out(&self) -> Vec<&'static str> {
+        let SumoSection { type_attributes, timeouts, .. } = &self.traffic.sumo;
+        let harmless = SumoSection {
+            type_attributes: type_attributes.clone(),
+            timeouts: *timeouts,
+            ..SumoSection::default()
+        };
+        let is_builtin = |file: &str| file.starts_with("builtin:");
+        [
+            ("road", !is_builtin(&self.road)),
+            ("truck.file", !TruckParameters::names().any(|name| name == self.truck.file)),
+            ("policy_file", self.policy_file.as_ref().is_some_and(|file| !is_builtin(file))),
+            ("traffic.manifest", self.traffic.manifest.is_some()),
+            ("traffic.detectors", self.traffic.detectors.is_some()),
+            ("traffic.replay.file", self.traffic.replay.file.is_some()),
+            ("traffic.sumo", self.traffic.sumo != harmless),
+        ]
+        .into_iter()
+        .filter_map(|(key, reaches)| reaches.then_some(key))
+        .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_scenarios_stay_inside_and_each_way_out_is_named() {
+        for name in Scenario::names() {
+            assert!(Scenario::builtin(name).unwrap().reaches_out().is_empty(), "{name}");
+        }
+        type Change = fn(&mut Scenario);
+        let ways: [(&str, Change); 8] = [
+            ("road", |s| s.road = "/etc/map.xodr".to_owned()),
+            ("truck.file", |s| s.truck.file = "../truck.toml".to_owned()),
+            ("policy_file", |s| s.policy_file = Some("p.safetensors".to_owned())),
+            ("traffic.manifest", |s| s.traffic.manifest = Some("m.toml".to_owned())),
+            ("traffic.detectors", |s| s.traffic.detectors = Some("d.csv".to_owned())),
+            ("traffic.replay.file", |s| s.traffic.replay.file = Some("r.csv".to_owned())),
+            ("traffic.sumo", |s| s.traffic.sumo.binary = Some("/bin/sh".to_owned())),
+            ("traffic.sumo", |s| s.traffic.sumo.options = vec!["--save-state".to_owned()]),
+        ];
+        for (key, change) in ways {
+            let mut scenario = Scenario::builtin("highway").unwrap();
+            change(&mut scenario);
+            assert_eq!(scenario.reaches_out(), [key]);
+        }
+    }
+}

@@ -1,0 +1,400 @@
+"""A ROS 2 node of another make (rclpy) watches and commands a run: `--ros2`.
+
+Runs in the environment that `peer.sh` makes; SIM_SERVER names the program.
+"""
+
+import itertools
+import json
+import os
+import random
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry
+from nav_msgs.msg import Path as PathMessage
+from rcl_interfaces.msg import Log
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, NavSatFix
+from simulation_interfaces.msg import (
+    EntityCategory,
+    EntityFilters,
+    Resource,
+    Result,
+    SimulationState,
+)
+from simulation_interfaces.srv import (
+    GetAvailableWorlds,
+    GetCurrentWorld,
+    GetEntities,
+    GetEntitiesStates,
+    GetEntityState,
+    GetSimulationState,
+    GetSimulatorFeatures,
+    LoadWorld,
+    ResetSimulation,
+    SetSimulationState,
+    StepSimulation,
+)
+from std_msgs.msg import Float64, String
+from tf2_msgs.msg import TFMessage
+from truck_msgs.msg import PlanState, Scene, TruckState
+from visualization_msgs.msg import MarkerArray
+
+SERVER = os.environ["SIM_SERVER"]
+# Two test runs on one machine must not meet
+DOMAIN = random.Random(os.getpid()).randrange(1, 100)
+DISCOVERY_S = 20.0
+RELIABLE = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+LATCHED = QoSProfile(
+    depth=64,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+TOPICS: dict[str, tuple[Any, QoSProfile]] = {
+    "/clock": (Clock, RELIABLE),
+    "/tf": (TFMessage, RELIABLE),
+    "/tf_static": (TFMessage, LATCHED),
+    "/odom": (Odometry, RELIABLE),
+    "/imu": (Imu, RELIABLE),
+    "/fix": (NavSatFix, RELIABLE),
+    "/diagnostics": (DiagnosticArray, RELIABLE),
+    "/truck/state": (TruckState, RELIABLE),
+    "/truck/plan": (PlanState, RELIABLE),
+    "/plan/path": (PathMessage, RELIABLE),
+    "/scene": (Scene, RELIABLE),
+    "/markers": (MarkerArray, RELIABLE),
+    "/road/lanes": (MarkerArray, LATCHED),
+}
+
+
+def ns(stamp: Any) -> int:
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def groups(all_of_them: list[str], of: int) -> Iterator[list[str]]:
+    for start in range(0, len(all_of_them), of):
+        yield all_of_them[start : start + of]
+
+
+class Peer:
+    """A node with an executor of its own, and what it heard."""
+
+    def __init__(self) -> None:
+        rclpy.init(domain_id=DOMAIN)
+        self.node = Node("peer")
+        self.executor = SingleThreadedExecutor()
+        self.executor.add_node(self.node)
+        self.heard: dict[str, list[Any]] = {name: [] for name in [*TOPICS, "/rosout"]}
+        for name, (kind, qos) in TOPICS.items():
+            self.node.create_subscription(kind, name, self.heard[name].append, qos)
+        self.node.create_subscription(
+            Log, "/rosout", self.heard["/rosout"].append, LATCHED
+        )
+        self.services: dict[str, Any] = {}
+
+    def until(
+        self, done: Callable[[], bool], what: str, within_s: float = 60.0
+    ) -> None:
+        end = time.monotonic() + within_s
+        while not done():
+            assert time.monotonic() < end, f"{what}: not within {within_s} s"
+            self.executor.spin_once(timeout_sec=0.05)
+
+    def call(self, kind: Any, name: str, **fields: Any) -> Any:
+        if name not in self.services:
+            self.services[name] = self.node.create_client(kind, name)
+            self.until(self.services[name].service_is_ready, name, DISCOVERY_S)
+            # A client knows the server before the server knows it: an answer would be lost
+            end = time.monotonic() + 1.0
+            while time.monotonic() < end:
+                self.executor.spin_once(timeout_sec=0.05)
+        client = self.services[name]
+        future = client.call_async(kind.Request(**fields))
+        self.until(future.done, name)
+        return future.result()
+
+    def state(self) -> int:
+        return int(self.call(GetSimulationState, "/get_simulation_state").state.state)
+
+    def set_state(self, state: int) -> Any:
+        wish = SimulationState(state=state)
+        return self.call(SetSimulationState, "/set_simulation_state", state=wish).result
+
+    def clock_ns(self) -> int:
+        return ns(self.heard["/clock"][-1].clock)
+
+    def settled_clock_ns(self) -> int:
+        """The clock, once nothing more comes."""
+        while True:
+            before = len(self.heard["/clock"])
+            end = time.monotonic() + 0.5
+            while time.monotonic() < end:
+                self.executor.spin_once(timeout_sec=0.05)
+            if len(self.heard["/clock"]) == before:
+                return self.clock_ns()
+
+    def step(self, steps: int) -> Any:
+        return self.call(StepSimulation, "/step_simulation", steps=steps).result
+
+
+def program(*options: str) -> subprocess.Popen[str]:
+    environment = os.environ | {"ROS_DOMAIN_ID": str(DOMAIN)}
+    for name in ("LD_LIBRARY_PATH", "PYTHONPATH"):
+        environment.pop(name, None)
+    return subprocess.Popen(
+        [SERVER, "run", *options],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("ros2") / "out"
+
+
+@pytest.fixture(scope="module")
+def run(folder: Path) -> Iterator[subprocess.Popen[str]]:
+    options = ["--headless", "--pace", "realtime", "--ros2", "--decider", "external"]
+    process = program("highway", *options, "--out", str(folder))
+    yield process
+    process.kill()
+    process.wait()
+
+
+@pytest.fixture(scope="module")
+def peer(run: subprocess.Popen[str]) -> Iterator[Peer]:
+    peer = Peer()
+    peer.until(lambda: bool(peer.heard["/clock"]), "the clock", DISCOVERY_S)
+    yield peer
+    peer.node.destroy_node()
+    rclpy.shutdown()
+
+
+def test_every_topic_is_heard_with_one_type(peer: Peer) -> None:
+    peer.until(lambda: all(peer.heard[name] for name in TOPICS), "every topic")
+    types = dict(peer.node.get_topic_names_and_types())
+    for name, (kind, _) in TOPICS.items():
+        package = kind.__module__.split(".")[0]
+        assert types[name] == [f"{package}/msg/{kind.__name__}"], name
+    assert ("tractrix", "/") in peer.node.get_node_names_and_namespaces()
+
+
+def test_no_tick_is_missing_and_the_others_come_at_their_rates(peer: Peer) -> None:
+    start = {name: len(heard) for name, heard in peer.heard.items()}
+    since_ns = peer.clock_ns()
+    peer.until(lambda: peer.clock_ns() >= since_ns + 5_000_000_000, "5 s of the run")
+    passed = round((peer.clock_ns() - since_ns) / 10_000_000)
+    for name in ("/clock", "/odom", "/imu", "/truck/state", "/truck/plan"):
+        heard = peer.heard[name][start[name] :]
+        stamps = [ns(m.clock if name == "/clock" else m.header.stamp) for m in heard]
+        steps = {b - a for a, b in itertools.pairwise(stamps)}
+        assert steps == {10_000_000}, (name, steps)
+        assert abs(len(stamps) - passed) <= 3, name
+    for name, every in (
+        ("/scene", 10),
+        ("/markers", 10),
+        ("/fix", 10),
+        ("/diagnostics", 100),
+    ):
+        assert abs(len(peer.heard[name]) - start[name] - passed / every) <= 2, name
+
+
+def test_another_nodes_clock_follows_the_run(peer: Peer) -> None:
+    follower = Node(
+        "follower", parameter_overrides=[Parameter("use_sim_time", value=True)]
+    )
+    peer.executor.add_node(follower)
+    peer.until(
+        lambda: follower.get_clock().now().nanoseconds > 0, "sim time", DISCOVERY_S
+    )
+    peer.until(
+        lambda: (
+            abs(follower.get_clock().now().nanoseconds - peer.clock_ns()) < 50_000_000
+        ),
+        "the same time",
+    )
+    peer.executor.remove_node(follower)
+    follower.destroy_node()
+
+
+def test_only_what_works_is_a_feature(peer: Peer) -> None:
+    features = peer.call(GetSimulatorFeatures, "/get_simulator_features").features
+    assert sorted(features.features) == [8, 10, 20, 24, 25, 26, 31, 32, 40, 41, 44, 45]
+
+
+def test_pause_step_and_play(peer: Peer) -> None:
+    assert peer.state() == SimulationState.STATE_PLAYING
+    refused = peer.step(10)
+    assert refused.result == Result.RESULT_OPERATION_FAILED
+    assert "pause" in refused.error_message
+    assert peer.set_state(SimulationState.STATE_PAUSED).result == Result.RESULT_OK
+    again = peer.set_state(SimulationState.STATE_PAUSED)
+    assert again.result == SetSimulationState.Response.ALREADY_IN_TARGET_STATE
+    before = peer.settled_clock_ns()
+    assert peer.step(10).result == Result.RESULT_OK
+    assert peer.settled_clock_ns() == before + 100_000_000
+    assert peer.step(1).result == Result.RESULT_OK
+    assert peer.settled_clock_ns() == before + 110_000_000
+    assert peer.step(0).result == Result.RESULT_OPERATION_FAILED
+    assert peer.step(2**63).result == Result.RESULT_OPERATION_FAILED
+    assert peer.set_state(77).result == SetSimulationState.Response.INCORRECT_TRANSITION
+    assert peer.set_state(SimulationState.STATE_PLAYING).result == Result.RESULT_OK
+    peer.until(lambda: peer.clock_ns() > before + 500_000_000, "it goes on")
+
+
+def test_entities_are_those_of_the_topics(peer: Peer) -> None:
+    peer.set_state(SimulationState.STATE_PAUSED)
+    peer.settled_clock_ns()
+    found = peer.call(GetEntities, "/get_entities")
+    assert found.result.result == Result.RESULT_OK
+    assert found.entities[0] == "ego" and len(found.entities) > 1
+    others = [EntityCategory(category=EntityCategory.CATEGORY_DYNAMIC_OBJECT)]
+    for names in groups(found.entities[1:], 4):
+        some = EntityFilters(filter="|".join(names), categories=others)
+        states = peer.call(GetEntitiesStates, "/get_entities_states", filters=some)
+        assert states.result.result == Result.RESULT_OK
+        assert list(states.entities) == list(names) and len(states.states) == len(names)
+    everybody = peer.call(GetEntitiesStates, "/get_entities_states")
+    if len(everybody.states) != len(found.entities):
+        # The middleware cannot send more at once
+        assert everybody.result.result == Result.RESULT_OPERATION_FAILED
+        assert "ask for fewer" in everybody.result.error_message
+    ego = peer.call(GetEntityState, "/get_entity_state", entity="ego")
+    odom = peer.heard["/odom"][-1]
+    assert ego.state.header.stamp == odom.header.stamp
+    assert ego.state.pose.position == odom.pose.pose.position
+    speed = (ego.state.twist.linear.x**2 + ego.state.twist.linear.y**2) ** 0.5
+    assert abs(speed - abs(odom.twist.twist.linear.x)) < 0.05
+    ghost = peer.call(GetEntityState, "/get_entity_state", entity="ghost")
+    assert ghost.result.result == Result.RESULT_NOT_FOUND
+    peer.set_state(SimulationState.STATE_PLAYING)
+
+
+def test_set_speed_and_lane_change_reach_the_truck(peer: Peer) -> None:
+    set_speed = peer.node.create_publisher(Float64, "/command/set_speed", 10)
+    lane_change = peer.node.create_publisher(String, "/command/lane_change", 10)
+    peer.until(
+        lambda: (
+            set_speed.get_subscription_count()
+            > 0
+            < lane_change.get_subscription_count()
+        ),
+        "its ears",
+        DISCOVERY_S,
+    )
+    set_speed.publish(Float64(data=15.0))
+    peer.until(
+        lambda: peer.heard["/truck/plan"][-1].reference_speed_m_s < 19.0,
+        "a lower reference speed",
+    )
+    set_speed.publish(Float64(data=float("nan")))
+    peer.until(
+        lambda: any("set speed nan" in m.msg.lower() for m in peer.heard["/rosout"]),
+        "a complaint",
+    )
+
+    def changes() -> bool:
+        plan = peer.heard["/truck/plan"][-1]
+        if plan.maneuver == "keep_lane" and time.monotonic() > changes.next:  # type: ignore[attr-defined]
+            changes.next = time.monotonic() + 0.5  # type: ignore[attr-defined]
+            lane_change.publish(String(data="left"))
+        return plan.maneuver not in ("keep_lane", "") or plan.refusal != ""
+
+    changes.next = 0.0  # type: ignore[attr-defined]
+    peer.until(changes, "a lane change or its refusal")
+
+
+def test_a_reset_starts_time_again_and_says_so(peer: Peer, folder: Path) -> None:
+    assert peer.clock_ns() > 5_000_000_000
+    partly = peer.call(ResetSimulation, "/reset_simulation", scope=1)
+    assert partly.result.result == Result.RESULT_FEATURE_UNSUPPORTED
+    done = peer.call(ResetSimulation, "/reset_simulation", scope=0)
+    assert done.result.result == Result.RESULT_OK
+    peer.until(lambda: peer.clock_ns() < 5_000_000_000, "a new time")
+    peer.until(
+        lambda: any("time starts again" in m.msg for m in peer.heard["/rosout"]),
+        "a word on /rosout",
+    )
+    assert (folder / "summary.json").exists() and (folder / "run-2").is_dir()
+
+
+def test_worlds_are_loaded_by_name_or_text_but_not_from_files(peer: Peer) -> None:
+    worlds = peer.call(GetAvailableWorlds, "/get_available_worlds").worlds
+    assert {"flat", "highway"} <= {world.name for world in worlds}
+
+    def load(uri: str = "", text: str = "") -> Any:
+        resource = Resource(uri=uri, resource_string=text)
+        return peer.call(LoadWorld, "/load_world", world_resource=resource)
+
+    wrong = load(uri="/etc/passwd").result
+    assert (
+        wrong.result == Result.RESULT_OPERATION_FAILED
+        and "/etc/passwd" in wrong.error_message
+    )
+    assert load().result.result == LoadWorld.Response.NO_RESOURCE
+    text = subprocess.run(
+        [SERVER, "scenario", "show", "flat"], capture_output=True, text=True, check=True
+    ).stdout
+    outside = text.replace('"builtin:flat"', '"/etc/hostname.csv"')
+    assert outside != text
+    refused = load(text=outside).result
+    assert (
+        refused.result == Result.RESULT_OPERATION_FAILED
+        and "road" in refused.error_message
+    )
+    assert peer.call(GetCurrentWorld, "/get_current_world").world.name == "highway"
+    loaded = load(uri="flat")
+    assert loaded.result.result == Result.RESULT_OK and loaded.world.name == "flat"
+    assert peer.state() == SimulationState.STATE_STOPPED
+    assert peer.step(1).result == Result.RESULT_OPERATION_FAILED
+    assert peer.set_state(SimulationState.STATE_PAUSED).result == Result.RESULT_OK
+    assert peer.step(100).result == Result.RESULT_OK
+    assert peer.settled_clock_ns() == 990_000_000
+
+
+def test_a_second_program_on_the_domain_is_refused(peer: Peer, folder: Path) -> None:
+    out = folder.parent / "second"
+    second = program("flat", "--headless", "--ros2", "--out", str(out))
+    _, words = second.communicate(timeout=60)
+    assert second.returncode == 2 and f"domain {DOMAIN}" in words, words
+    assert not out.exists()
+
+
+def test_quitting_ends_the_program_with_its_summary(
+    peer: Peer, run: subprocess.Popen[str], folder: Path
+) -> None:
+    assert peer.set_state(SimulationState.STATE_QUITTING).result == Result.RESULT_OK
+    assert run.wait(timeout=30) == 0
+    summary = json.loads((folder / "run-3" / "summary.json").read_text())
+    assert summary["duration_s"] == pytest.approx(0.99), "the last of 100 ticks"
+
+
+def test_a_domain_that_cannot_be_is_named(tmp_path: Path) -> None:
+    environment = os.environ | {"ROS_DOMAIN_ID": "300"}
+    for name in ("LD_LIBRARY_PATH", "PYTHONPATH"):
+        environment.pop(name, None)
+    answer = subprocess.run(
+        [SERVER, "run", "flat", "--headless", "--ros2", "--out", str(tmp_path / "out")],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert answer.returncode == 2
+    assert answer.stderr.strip().endswith(
+        "ROS_DOMAIN_ID=300: expected a number from 0 to 232"
+    )
