@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
 
 FLAGS = [
     "--headless",
@@ -31,6 +31,8 @@ FLAGS = [
     "--disable-sync",
 ]
 WAIT_MS = 30_000
+SET_SPEED_IS_20 = """fetch('/api/v1/state').then(a => a.json())
+    .then(state => state.run.set_speed_m_s === 20)"""
 
 
 class Run:
@@ -93,8 +95,23 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def page(browser: Browser) -> Iterator[Page]:
-    """A page that fails the test on any error of a script, the console or a request."""
-    tab = browser.new_page(viewport={"width": 1440, "height": 960})
+    """A page that fails the test on any error of a script, the console or a request.
+
+    Without the page's policy, which forbids the `eval` of Playwright's waiting functions.
+    """
+    yield from opened(browser, bypass_csp=True)
+
+
+@pytest.fixture
+def strict_page(browser: Browser) -> Iterator[Page]:
+    """As `page`, under the policy that a user's browser follows."""
+    yield from opened(browser, bypass_csp=False)
+
+
+def opened(browser: Browser, bypass_csp: bool) -> Iterator[Page]:
+    """A tab that must not see an error."""
+    size: ViewportSize = {"width": 1440, "height": 960}
+    tab = browser.new_page(viewport=size, bypass_csp=bypass_csp)
     tab.set_default_timeout(WAIT_MS)
     wrong: list[str] = []
     tab.on(
@@ -232,7 +249,7 @@ def test_a_tab_that_stays_open_shows_the_next_run_on_its_port(
 ) -> None:
     """It kept the road, the limits and the plots of the first run."""
     # Not the fixture: while nobody answers, the browser says so on the console.
-    tab = browser.new_page()
+    tab = browser.new_page(bypass_csp=True)
     tab.set_default_timeout(WAIT_MS)
     road = str(Path(__file__).parents[2] / "examples" / "road.csv")
     options = ["--road", road, "--duration", "20", "--pace", "max", "--keep-open"]
@@ -561,9 +578,73 @@ def test_other_web_sites_cannot_ask(server: Path, tmp_path: Path) -> None:
             assert refused.value.code == 403
         body = b'{"action": "fly"}'
         with pytest.raises(urllib.error.HTTPError) as refused:
-            urllib.request.urlopen(run.url + "/api/v1/control", body, timeout=10)
+            post = urllib.request.Request(
+                run.url + "/api/v1/control",
+                body,
+                headers={"Content-Type": "application/json"},
+            )
+            urllib.request.urlopen(post, timeout=10)
         assert refused.value.code == 400
         assert "fly" in json.load(refused.value)["error"]
+
+
+def test_a_run_is_driven_to_a_time_and_begun_again_from_the_page(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    with running(server, out, "highway-empty", "--pace", "max") as run:
+        page.goto(run.url)
+        page.wait_for_selector("#strips .trace", state="attached")
+        page.click("#play")
+        page.click(".more summary")
+        page.fill("#set-speed-kmh", "72")
+        page.click("#set-speed")
+        page.wait_for_function(SET_SPEED_IS_20)
+        page.fill("#seed", "7")
+        with page.expect_navigation():
+            page.click("#again")
+        page.wait_for_selector("#strips .trace", state="attached")
+        page.click(".more summary")
+        page.fill("#until-s", "12.5")
+        page.click("#until")
+        page.wait_for_function(
+            "document.getElementById('time').textContent === '0:12.5'"
+        )
+        assert (out / "run-2").is_dir()
+        assert run.get("/api/v1/state")["time_s"] == pytest.approx(12.49)
+
+
+def test_a_refusal_is_shown_in_the_servers_words(
+    server: Path, browser: Browser, tmp_path: Path
+) -> None:
+    # Not the fixture: the browser says on the console that something was refused.
+    tab = browser.new_page(bypass_csp=True)
+    tab.set_default_timeout(WAIT_MS)
+    with running(server, tmp_path, "highway-empty") as run:
+        tab.goto(run.url)
+        tab.wait_for_selector("#strips .trace", state="attached")
+        tab.click(".more summary")
+        tab.fill("#seed", "18446744073709551616")
+        tab.click("#again")
+        tab.wait_for_selector("#answer:has-text('0 to 18446744073709551615')")
+        tab.set_viewport_size({"width": 390, "height": 800})
+        for element in (".more > div", "#answer"):
+            box = tab.locator(element).bounding_box()
+            assert box is not None
+            assert box["x"] >= 0 and box["x"] + box["width"] <= 390, element
+    tab.close()
+
+
+def test_the_page_works_under_its_own_policy(
+    server: Path, strict_page: Page, tmp_path: Path
+) -> None:
+    with running(server, tmp_path, "highway-empty", "--pace", "5") as run:
+        answer = strict_page.goto(run.url)
+        assert answer is not None
+        assert "script-src 'self'" in answer.headers["content-security-policy"]
+        strict_page.wait_for_selector("#strips .trace", state="attached")
+        strict_page.keyboard.press("Space")
+        strict_page.wait_for_selector("#state:text-is('paused')")
 
 
 def test_the_report_of_the_trucks_diagnosis_is_linked_and_served(

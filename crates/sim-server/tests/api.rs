@@ -56,8 +56,13 @@ impl Run {
         } else {
             format!("Content-Length: {}\r\n", body.len())
         };
+        let kind = if more_headers.contains("Content-Type:") {
+            ""
+        } else {
+            "Content-Type: application/json\r\n"
+        };
         let head = format!(
-            "{method} {path} HTTP/1.1\r\n{host}{more_headers}{length}Connection: close\r\n\r\n"
+            "{method} {path} HTTP/1.1\r\n{host}{more_headers}{length}{kind}Connection: close\r\n\r\n"
         );
         stream.write_all(&[head.as_bytes(), body].concat()).unwrap();
         let mut answer = String::new();
@@ -132,6 +137,131 @@ fn refusals_are_json_with_a_code_and_words_of_the_api() {
     refused(&run.ask("GET", "/api/v1/state", evil, b""), 403, "foreign_page", "this server");
     let long = "Content-Length: 9000000\r\n";
     refused(&run.ask("POST", "/api/v1/control", long, b""), 413, "body_not_read", "too long");
+    for kind in ["text/plain", "application/x-www-form-urlencoded", "application/jsonx"] {
+        let kind = format!("Content-Type: {kind}\r\n");
+        let form = run.ask("POST", "/api/v1/control", &kind, br#"{"action": "pause"}"#);
+        refused(&form, 415, "not_json", "application/json");
+    }
+    for headers in ["Origin: null\r\n", "Sec-Fetch-Site: cross-site\r\n"] {
+        let elsewhere = run.ask("POST", "/api/v1/control", headers, br#"{"action": "pause"}"#);
+        refused(&elsewhere, 403, "foreign_page", "this server");
+    }
+}
+
+/// A connection on which a head is sent as it is.
+fn sent(run: &Run, head: &str) -> TcpStream {
+    let mut stream = TcpStream::connect(&run.address).unwrap();
+    stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
+    stream.write_all(head.as_bytes()).unwrap();
+    stream
+}
+
+/// The first line of an answer; empty where the server has closed the connection.
+fn first_line(stream: &mut TcpStream) -> String {
+    let mut line = String::new();
+    // A connection that is turned away may be reset behind its answer
+    let _ = BufReader::new(stream).read_line(&mut line);
+    line
+}
+
+/// 500 sockets that said nothing were kept for ever.
+#[test]
+fn silent_clients_cannot_keep_others_out() {
+    let run = Run::start(&[]);
+    let mut idle: Vec<_> = (0..64).map(|_| sent(&run, "")).collect();
+    let slow = "POST /api/v1/control HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n";
+    idle[0].write_all(slow.as_bytes()).unwrap();
+    let turned_away = (0..100).any(|_| first_line(&mut sent(&run, "")).contains(" 503 "));
+    assert!(turned_away, "the 65th");
+    for stream in &mut idle {
+        assert_eq!(first_line(stream), "", "none of them said what it wants");
+    }
+    let body = format!("{slow}Content-Type: application/json\r\n\r\n{{");
+    let mut late = sent(&run, &body);
+    assert_eq!(run.state()["schema"], 1);
+    assert!(first_line(&mut late).contains(" 408 "), "a body that does not come");
+}
+
+/// The body of an answer of any kind.
+fn text(run: &Run, path: &str) -> String {
+    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+    let mut answer = String::new();
+    sent(run, &request).read_to_string(&mut answer).unwrap();
+    answer
+}
+
+#[test]
+fn a_monitor_can_ask_how_the_run_goes() {
+    let run = Run::start(&["--pace", "max"]);
+    run.act(r#"{"action": "pause"}"#);
+    run.act(r#"{"action": "reset"}"#);
+    let stands = (0..300).any(|_| {
+        std::thread::sleep(Duration::from_millis(20));
+        run.state()["time_s"] == 0.0
+    });
+    assert!(stands, "a run that stands at its start is seen");
+    let before = counted(&run, "tractrix_ticks_total");
+    run.act(r#"{"action": "step", "ticks": 150, "wait": true}"#);
+    assert_eq!(counted(&run, "tractrix_ticks_total"), before + 150.0);
+    assert_eq!(counted(&run, "tractrix_tick_time_seconds_count"), before + 150.0);
+    let seconds = counted(&run, "tractrix_tick_time_seconds_sum");
+    assert!(seconds > 0.0 && seconds < 60.0, "{seconds}");
+    assert_eq!(counted(&run, "tractrix_viewers"), 0.0);
+    assert!(run.state()["time_s"].is_number());
+    assert_eq!(run.ask("GET", "/api/v1/ready", "", b"").0, 200);
+    assert!(text(&run, "/api/v1/metrics").trim_end().ends_with("# EOF"));
+}
+
+/// The value of a metric.
+fn counted(run: &Run, name: &str) -> f64 {
+    let answer = text(run, "/api/v1/metrics");
+    let line = answer.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    line.unwrap_or_else(|| panic!("{name}: {answer}")).parse().unwrap()
+}
+
+/// 300 viewers that took nothing were kept for ever.
+#[test]
+fn viewers_have_sixteen_places_and_listen() {
+    let run = Run::start(&[]);
+    let handshake = format!(
+        "GET /ws HTTP/1.1\r\nHost: {}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
+        run.address
+    );
+    let mut viewers: Vec<_> = (0..16).map(|_| sent(&run, &handshake)).collect();
+    for viewer in &mut viewers {
+        assert!(first_line(viewer).contains(" 101 "));
+    }
+    assert!(first_line(&mut sent(&run, &handshake)).contains(" 429 "), "the 17th");
+    // A masked text frame of 5,000 bytes
+    let head = [0x81, 0x80 | 126, 0x13, 0x88, 0, 0, 0, 0];
+    viewers[0].write_all(&[&head[..], &[b'x'; 5_000]].concat()).unwrap();
+    let again = (0..600).any(|_| {
+        std::thread::sleep(Duration::from_millis(50));
+        first_line(&mut sent(&run, &handshake)).contains(" 101 ")
+    });
+    assert!(again, "who talks too much leaves a place");
+}
+
+#[test]
+fn browsers_are_told_what_an_answer_may_do() {
+    let run = Run::start(&[]);
+    for path in ["/", "/api/v1/health", "/assets/app.js", "/nothing"] {
+        let request =
+            format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+        let mut answer = String::new();
+        sent(&run, &request).read_to_string(&mut answer).unwrap();
+        let head = answer.split("\r\n\r\n").next().unwrap().to_ascii_lowercase();
+        for wanted in [
+            "content-security-policy: default-src 'none'; script-src 'self'",
+            "frame-ancestors 'none'",
+            "x-content-type-options: nosniff",
+            "referrer-policy: no-referrer",
+            "cross-origin-resource-policy: same-origin",
+        ] {
+            assert!(head.contains(wanted), "{path}: {head}");
+        }
+    }
 }
 
 /// A pace of 5 was refused, only "5" was taken.

@@ -46,14 +46,47 @@ pub(super) fn body_not_read() -> Response {
     error(StatusCode::PAYLOAD_TOO_LARGE, "body_not_read", why)
 }
 
+/// A body that did not arrive in time.
+pub(super) fn body_too_slow() -> Response {
+    error(StatusCode::REQUEST_TIMEOUT, "body_too_slow", "the body has not arrived in 10 s")
+}
+
+/// A body of another kind.
+pub(super) fn not_json() -> Response {
+    let why = "the body must be JSON: Content-Type: application/json";
+    error(StatusCode::UNSUPPORTED_MEDIA_TYPE, "not_json", why)
+}
+
+/// One viewer more than there are places.
+pub(super) fn too_many_viewers() -> Response {
+    let why = format!("{} viewers look on already", super::MAX_VIEWERS);
+    let mut response = error(StatusCode::TOO_MANY_REQUESTS, "too_many_viewers", &why);
+    response.headers_mut().insert(header::RETRY_AFTER, header::HeaderValue::from_static("5"));
+    response
+}
+
 /// The latest frame.
 pub(super) async fn state(State(shared): State<Arc<Shared>>) -> Response {
-    let frame = shared.frame.borrow().clone();
-    if frame.is_empty() {
-        let why = "no tick has been driven yet";
-        return error(StatusCode::SERVICE_UNAVAILABLE, "no_tick_yet", why);
+    let frame = Arc::clone(&shared.frame.borrow().json);
+    if frame.is_empty() { no_tick_yet() } else { json(StatusCode::OK, frame.to_string()) }
+}
+
+fn no_tick_yet() -> Response {
+    error(StatusCode::SERVICE_UNAVAILABLE, "no_tick_yet", "no tick has been driven yet")
+}
+
+/// Says that there is a run to look at.
+pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Response {
+    if shared.frame.borrow().json.is_empty() {
+        return no_tick_yet();
     }
-    json(StatusCode::OK, frame.to_string())
+    json(StatusCode::OK, serde_json::json!({ "schema": SCHEMA, "status": "ready" }).to_string())
+}
+
+/// Counts and times, OpenMetrics.
+pub(super) async fn metrics(State(shared): State<Arc<Shared>>) -> Response {
+    let kind = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+    ([(header::CONTENT_TYPE, kind)], shared.metrics.text()).into_response()
 }
 
 /// The summary so far, the final one after the end.

@@ -9,11 +9,12 @@ use crate::picture::plotly_js;
 
 const HTML: &str = include_str!("page/index.html");
 /// Style sheets and modules of the page by path.
-const FILES: [(&str, &str, &str); 9] = [
+const FILES: [(&str, &str, &str); 10] = [
     ("/assets/theme.css", STYLE, include_str!("page/theme.css")),
     ("/assets/style.css", STYLE, include_str!("page/style.css")),
     ("/assets/app.js", SCRIPT, include_str!("page/app.js")),
     ("/assets/ahead.js", SCRIPT, include_str!("page/ahead.js")),
+    ("/assets/controls.js", SCRIPT, include_str!("page/controls.js")),
     ("/assets/minimap.js", SCRIPT, include_str!("page/minimap.js")),
     ("/assets/strips.js", SCRIPT, include_str!("page/strips.js")),
     ("/assets/theme.js", SCRIPT, include_str!("page/theme.js")),

@@ -7,7 +7,10 @@
 mod ahead;
 mod api;
 mod assets;
+mod connections;
 mod frame;
+mod gate;
+mod metrics;
 mod publisher;
 mod road_view;
 mod server;
@@ -16,18 +19,19 @@ mod strip;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tokio::sync::watch;
+use tokio::sync::{Semaphore, watch};
 
 pub(crate) use publisher::Publisher;
 pub(crate) use server::{Dashboard, bind};
 
+use self::metrics::Metrics;
 use self::strip::Strip;
 use crate::session::Handle;
 
 /// What the world's thread leaves for the viewers.
 pub(crate) struct Shared {
-    /// The latest frame as JSON.
-    frame: watch::Sender<Arc<str>>,
+    /// The latest frame.
+    frame: watch::Sender<Published>,
     /// Columns of the strip plots since the start.
     strip: Mutex<Strip>,
     /// The summary so far as JSON.
@@ -36,7 +40,24 @@ pub(crate) struct Shared {
     setting: Mutex<Setting>,
     /// To the session.
     handle: Handle,
+    metrics: Metrics,
+    /// Places for viewers.
+    viewers: Arc<Semaphore>,
 }
+
+/// A frame, and what a viewer must know about it without reading it.
+#[derive(Clone, Default)]
+struct Published {
+    /// As JSON; empty before the first tick.
+    json: Arc<str>,
+    /// Frames before it.
+    number: u64,
+    /// It is the last one of its run.
+    is_last: bool,
+}
+
+/// Viewers at once, at most.
+const MAX_VIEWERS: usize = 16;
 
 /// What does not change during a run.
 #[derive(Clone)]
@@ -51,11 +72,13 @@ impl Shared {
     /// Nothing published yet.
     pub(crate) fn new(setting: Setting, handle: Handle) -> Arc<Self> {
         Arc::new(Self {
-            frame: watch::Sender::new(Arc::from("")),
+            frame: watch::Sender::default(),
             strip: Mutex::default(),
             summary: Mutex::new(Arc::from("{}")),
             setting: Mutex::new(setting),
             handle,
+            metrics: Metrics::new(),
+            viewers: Arc::new(Semaphore::new(MAX_VIEWERS)),
         })
     }
 

@@ -9,10 +9,10 @@ use serde::Serialize;
 use sim::{GhostReport, Scenario, Summary, World};
 use tractrix_core::{Recorder, Tick};
 
-use super::Shared;
 use super::ahead::{Lead, SpeedAhead};
 use super::frame::{Ego, Frame, GhostHere, Here, Other, Planned, Refused, Run, Snapshot};
 use super::strip::round;
+use super::{Published, Shared};
 use crate::provenance::Provenance;
 use crate::session::{Pace, RunState};
 
@@ -117,8 +117,18 @@ impl Publisher {
             (serde_json::to_string(&frame), serde_json::to_string(&so_far))
         {
             *self.shared.summary() = so_far.into();
-            self.shared.frame.send_replace(frame.into());
+            self.shared.metrics.realtime_factor.set(self.realtime_factor);
+            let is_last = state == RunState::Finished;
+            self.shared.frame.send_modify(|published| {
+                let number = published.number + 1;
+                *published = Published { json: frame.into(), number, is_last };
+            });
         }
+    }
+
+    /// Notes how long a tick's work took.
+    pub(crate) fn note_tick(&self, work: Duration, missed_deadline: bool) {
+        self.shared.metrics.note_tick(work, missed_deadline);
     }
 
     /// Replaces the summary under way by the final one.
@@ -129,6 +139,7 @@ impl Publisher {
 
 impl Recorder for Publisher {
     fn record(&mut self, tick: &Tick<'_>) {
+        self.shared.metrics.guard_ticks.inc_by((!tick.plan.guard.is_empty()).into());
         let kept = self.snapshot.get_or_insert_default();
         kept.now = tick.now;
         kept.ego = *tick.ego;

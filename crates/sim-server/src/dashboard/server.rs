@@ -1,16 +1,16 @@
-//! The HTTP server: routes, the loopback listener, and who may ask.
+//! The HTTP server: routes and the loopback listener.
 
 use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
 
 use axum::Router;
-use axum::extract::{Request, State};
-use axum::http::{HeaderMap, Uri, header};
-use axum::middleware::{self, Next};
+use axum::extract::State;
+use axum::http::Uri;
+use axum::middleware;
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 
-use super::{Shared, api, assets, socket};
+use super::{Shared, api, assets, connections, gate, socket};
 use crate::failure::Failure;
 
 /// The loopback listener of the dashboard. Port 0 takes any free port.
@@ -47,7 +47,8 @@ impl Dashboard {
     /// [`Failure::Work`] when the listener fails.
     pub(crate) async fn serve(self) -> Result<(), Failure> {
         let listener = tokio::net::TcpListener::from_std(self.listener).map_err(Failure::work)?;
-        axum::serve(listener, router(self.shared)).await.map_err(Failure::work)
+        connections::serve(listener, router(self.shared)).await;
+        Ok(())
     }
 }
 
@@ -57,12 +58,14 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/api/v1/summary", get(api::summary))
         .route("/api/v1/road", get(api::road))
         .route("/api/v1/health", get(api::health))
+        .route("/api/v1/ready", get(api::ready))
+        .route("/api/v1/metrics", get(api::metrics))
         .route("/api/v1/control", post(api::control))
         .route("/report", get(report))
         .route("/ws", get(socket::upgrade))
         .fallback(page)
         .method_not_allowed_fallback(api::wrong_method)
-        .layer(middleware::from_fn(local_only))
+        .layer(middleware::from_fn(gate::gate))
         .with_state(shared)
 }
 
@@ -75,52 +78,4 @@ async fn page(State(shared): State<Arc<Shared>>, uri: Uri) -> Response {
 async fn report(State(shared): State<Arc<Shared>>) -> Response {
     let page = |text: &Arc<str>| Html(text.to_string()).into_response();
     shared.setting().report.as_ref().map_or_else(|| api::not_found("/report"), page)
-}
-
-/// Refuses requests that another web site makes through the user's browser: a foreign `Host`
-/// (a name bound to 127.0.0.1) or a foreign `Origin`; and bodies that are announced as too long.
-async fn local_only(request: Request, next: Next) -> Response {
-    if !is_own(request.headers()) {
-        api::foreign()
-    } else if announced_bytes(request.headers()) > LONGEST_BODY {
-        api::body_not_read()
-    } else {
-        next.run(request).await
-    }
-}
-
-/// Longest body that is waited for, bytes: a control is a line.
-const LONGEST_BODY: u64 = 16_384;
-
-/// Length that a request says its body has, bytes.
-fn announced_bytes(headers: &HeaderMap) -> u64 {
-    let length = headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok());
-    length.and_then(|l| l.parse().ok()).unwrap_or(0)
-}
-
-fn is_own(headers: &HeaderMap) -> bool {
-    let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
-    let host = text(header::HOST).unwrap_or_default();
-    let origin = text(header::ORIGIN);
-    is_loopback(host) && origin.is_none_or(|o| o.strip_prefix("http://") == Some(host))
-}
-
-fn is_loopback(host: &str) -> bool {
-    let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
-    matches!(name, "127.0.0.1" | "localhost")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_loopback_names_are_served() {
-        for good in ["127.0.0.1:8080", "localhost:8080", "localhost"] {
-            assert!(is_loopback(good), "{good}");
-        }
-        for bad in ["", "evil.example:8080", "127.0.0.1.evil.example", "[::1]:8080"] {
-            assert!(!is_loopback(bad), "{bad}");
-        }
-    }
 }

@@ -3,19 +3,27 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::body::Bytes;
 use axum::extract::State;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::response::Response;
 use serde::Serialize;
 
-use super::Shared;
 use super::strip::Strip;
+use super::{Published, Shared, api};
 use crate::provenance::SCHEMA;
 
 /// New rows of the strip plots are sent at most this often, in frames.
 const FRAMES_PER_STRIP: u32 = 10;
 /// A viewer that takes longer for one message is dropped.
 const SEND_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// A viewer has nothing to say.
+const MAX_INCOMING_BYTES: usize = 4_096;
+/// A viewer is asked so often whether it is still there,
+const PING_PERIOD: Duration = Duration::from_secs(10);
+/// and has this time to answer.
+const SILENCE: Duration = Duration::from_secs(30);
 
 /// New rows of the strip plots.
 #[derive(Serialize)]
@@ -29,15 +37,25 @@ struct StripRows {
 }
 
 pub(super) async fn upgrade(State(shared): State<Arc<Shared>>, ws: WebSocketUpgrade) -> Response {
-    ws.on_upgrade(
-        move |socket| async move { Viewer { socket, shared, rows_sent: 0 }.serve().await },
-    )
+    let Ok(place) = Arc::clone(&shared.viewers).try_acquire_owned() else {
+        return api::too_many_viewers();
+    };
+    let ws = ws.max_message_size(MAX_INCOMING_BYTES).max_frame_size(MAX_INCOMING_BYTES);
+    ws.on_upgrade(move |socket| async move {
+        shared.metrics.viewers.inc();
+        let viewer = Viewer { socket, shared: Arc::clone(&shared), rows_sent: 0, last_frame: None };
+        viewer.serve().await;
+        shared.metrics.viewers.dec();
+        drop(place);
+    })
 }
 
 struct Viewer {
     socket: WebSocket,
     shared: Arc<Shared>,
     rows_sent: usize,
+    /// Number of the last frame that was sent.
+    last_frame: Option<u64>,
 }
 
 impl Viewer {
@@ -46,10 +64,20 @@ impl Viewer {
         let mut frames = self.shared.frame.subscribe();
         frames.mark_changed();
         let mut count = 0_u32;
+        let mut ping = tokio::time::interval(PING_PERIOD);
+        let silence = tokio::time::sleep(SILENCE);
+        tokio::pin!(silence);
         loop {
             tokio::select! {
                 incoming = self.socket.recv() => {
                     if !matches!(incoming, Some(Ok(_))) {
+                        return;
+                    }
+                    silence.as_mut().reset(tokio::time::Instant::now() + SILENCE);
+                }
+                () = &mut silence => return,
+                _ = ping.tick() => {
+                    if !self.send(Message::Ping(Bytes::new())).await {
                         return;
                     }
                 }
@@ -58,17 +86,30 @@ impl Viewer {
                         return;
                     }
                     let frame = frames.borrow_and_update().clone();
-                    if !frame.is_empty() && !self.send(&frame).await {
+                    if !frame.json.is_empty() && !self.send_frame(&frame).await {
                         return;
                     }
                     let due = count.is_multiple_of(FRAMES_PER_STRIP);
                     count = count.wrapping_add(1);
-                    if (due || frame.contains("\"state\":\"finished\"")) && !self.send_rows().await {
+                    if (due || frame.is_last) && !self.send_rows().await {
                         return;
                     }
                 }
             }
         }
+    }
+
+    /// A frame, and before it how many the viewer was too slow for.
+    async fn send_frame(&mut self, frame: &Published) -> bool {
+        let lost = lost_since(self.last_frame.replace(frame.number), frame.number);
+        if lost > 0 {
+            self.shared.metrics.lost_frames.inc_by(lost);
+            let told = serde_json::json!({ "schema": SCHEMA, "kind": "lost", "frames": lost });
+            if !self.send(Message::Text(told.to_string().into())).await {
+                return false;
+            }
+        }
+        self.send(Message::Text((&*frame.json).into())).await
     }
 
     async fn send_rows(&mut self) -> bool {
@@ -83,13 +124,30 @@ impl Viewer {
         self.rows_sent += rows.len();
         let message = StripRows { schema: SCHEMA, kind: "strip", first, rows };
         match serde_json::to_string(&message) {
-            Ok(text) => self.send(&text).await,
+            Ok(text) => self.send(Message::Text(text.into())).await,
             Err(_) => false,
         }
     }
 
-    async fn send(&mut self, text: &str) -> bool {
-        let message = Message::Text(text.into());
+    async fn send(&mut self, message: Message) -> bool {
         matches!(tokio::time::timeout(SEND_TIMEOUT, self.socket.send(message)).await, Ok(Ok(())))
+    }
+}
+
+/// Frames between the last one that was sent and this one.
+fn lost_since(last: Option<u64>, number: u64) -> u64 {
+    last.map_or(0, |last| number.saturating_sub(last + 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_between_two_that_were_sent_are_lost() {
+        assert_eq!(lost_since(None, 900), 0, "what came before a viewer was not meant for it");
+        assert_eq!(lost_since(Some(900), 901), 0);
+        assert_eq!(lost_since(Some(900), 900), 0, "the last frame once more");
+        assert_eq!(lost_since(Some(900), 904), 3);
     }
 }

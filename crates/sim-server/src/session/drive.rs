@@ -56,20 +56,31 @@ pub(crate) type Reply = oneshot::Sender<Result<Acted, Refused>>;
 /// Viewers get a frame this often (wall time).
 const FRAME_PERIOD: Duration = Duration::from_millis(50);
 
+/// Who looks at a tick.
+struct Views<'a> {
+    publisher: Option<&'a mut Publisher>,
+    handle: &'a Handle,
+}
+
+impl Recorder for Views<'_> {
+    fn record(&mut self, tick: &Tick<'_>) {
+        if let Some(publisher) = &mut self.publisher {
+            publisher.record(tick);
+        }
+        self.handle.note_bodies(tick);
+    }
+}
+
 /// The consumers of a tick.
 struct Sinks<'a> {
     recording: &'a mut Recording,
-    publisher: Option<&'a mut Publisher>,
-    handle: &'a Handle,
+    views: Views<'a>,
 }
 
 impl Recorder for Sinks<'_> {
     fn record(&mut self, tick: &Tick<'_>) {
         self.recording.record(tick);
-        if let Some(publisher) = &mut self.publisher {
-            publisher.record(tick);
-        }
-        self.handle.note_bodies(tick);
+        self.views.record(tick);
     }
 
     fn step(&mut self, step: &Step<'_>) {
@@ -117,6 +128,9 @@ impl Drive {
     pub(crate) fn run(mut self) -> Ended {
         let mut failure = self.job.world.attach_ghost().map_err(Failure::work).err();
         self.enter(self.job.state);
+        if failure.is_none() && self.stands() {
+            self.show_start();
+        }
         let reason = loop {
             if failure.is_some() {
                 break EndReason::Failed;
@@ -179,6 +193,15 @@ impl Drive {
         }
     }
 
+    /// A run that stands at its start is seen as its first tick will find it: in a copy.
+    fn show_start(&mut self) {
+        let mut copy = self.job.world.clone();
+        let mut views = Views { publisher: self.job.publisher.as_mut(), handle: &self.job.handle };
+        if copy.tick(&mut views).is_ok() {
+            self.publish_if_due(RunState::Paused);
+        }
+    }
+
     fn is_over(&self) -> bool {
         self.quits || self.next.is_some() || self.job.stop.load(Ordering::Relaxed)
     }
@@ -189,15 +212,15 @@ impl Drive {
 
     fn drive_tick(&mut self) -> Result<Status, Failure> {
         let began = self.start.elapsed();
-        let mut sinks = Sinks {
-            recording: &mut self.job.recording,
-            publisher: self.job.publisher.as_mut(),
-            handle: &self.job.handle,
-        };
+        let views = Views { publisher: self.job.publisher.as_mut(), handle: &self.job.handle };
+        let mut sinks = Sinks { recording: &mut self.job.recording, views };
         let status = self.job.world.tick(&mut sinks);
         let ended = self.start.elapsed();
         self.times.add(ended - began);
-        self.pacer.tick_ended(ended);
+        let missed = self.pacer.tick_ended(ended);
+        if let Some(publisher) = &self.job.publisher {
+            publisher.note_tick(ended - began, missed);
+        }
         self.tick += 1;
         self.steps = self.steps.saturating_sub(1);
         if self.steps == 0 {

@@ -100,16 +100,17 @@ impl Pacer {
         self.due(self.ticks).map_or(Duration::ZERO, |due| due.saturating_sub(now))
     }
 
-    /// Notes that a tick has ended.
-    pub(crate) fn tick_ended(&mut self, now: Duration) {
+    /// Notes that a tick has ended; true if that was after its deadline.
+    pub(crate) fn tick_ended(&mut self, now: Duration) -> bool {
         self.ticks += 1;
-        let Some(deadline) = self.due(self.ticks) else { return };
-        if now > deadline {
-            self.missed_deadlines += 1;
-            if now - deadline > LONGEST_LAG {
-                self.restart(self.pace, now);
-            }
+        let Some(deadline) = self.due(self.ticks).filter(|&deadline| now > deadline) else {
+            return false;
+        };
+        self.missed_deadlines += 1;
+        if now - deadline > LONGEST_LAG {
+            self.restart(self.pace, now);
         }
+        true
     }
 
     fn due(&self, tick: u64) -> Option<Duration> {

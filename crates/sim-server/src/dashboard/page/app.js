@@ -1,8 +1,8 @@
 // The dashboard: takes frames from /ws, fills the header and tiles, feeds views and strip plots.
 import { Ahead } from "/assets/ahead.js";
+import { enable, selectPace, startControls } from "/assets/controls.js";
 import { MiniMap } from "/assets/minimap.js";
 import { Strips } from "/assets/strips.js";
-import { nextTheme, onTheme, theme } from "/assets/theme.js";
 import { BirdView } from "/assets/view.js";
 import * as words from "/assets/words.js";
 
@@ -18,6 +18,7 @@ const ahead = new Ahead($("ahead"), road);
 const map = new MiniMap($("map"), road);
 const strips = new Strips($("strips"), road);
 let frame = null;
+startControls(view, () => frame);
 
 // -- telemetry -----------------------------------------------------------------------------------
 function connect() {
@@ -38,7 +39,7 @@ function connect() {
     }
   };
   socket.onclose = () => {
-    enable(false);
+    enable(null);
     if (frame?.run.state === "finished") return setTimeout(connect, 5000);
     $("state").dataset.state = "offline";
     text("state", "offline");
@@ -56,7 +57,7 @@ function show(f) {
   text("scenario", run.scenario);
   $("state").dataset.state = run.state;
   text("state", run.state);
-  enable(run.state !== "finished");
+  enable(run.state);
   for (const id of ["left", "right"]) $(id).hidden = !run.external_decider;
   text("play", run.state === "paused" ? "Play" : "Pause");
   if (document.activeElement !== $("pace")) selectPace(run.pace);
@@ -138,43 +139,6 @@ function braking(ego) {
   return parts.join(" · ");
 }
 
-// -- controls ------------------------------------------------------------------------------------
-const send = (control) => fetch("/api/v1/control", { method: "POST", body: JSON.stringify(control) });
-const enable = (on) => { for (const id of ["play", "step", "pace", "left", "right"]) $(id).disabled = !on; };
-
-function selectPace(pace) {
-  const select = $("pace");
-  if (![...select.options].some((o) => o.value === pace)) select.add(new Option(`${pace}×`, pace));
-  select.value = pace;
-}
-
-const toggle = () => send({ action: frame?.run.state === "paused" ? "play" : "pause" });
-const step = async () => {
-  if (frame?.run.state !== "paused") await send({ action: "pause" });
-  return send({ action: "step", ticks: 10 });
-};
-const change = (to) => send({ action: "lane_change", to });
-$("play").onclick = toggle;
-$("left").onclick = () => change("left");
-$("right").onclick = () => change("right");
-$("step").onclick = step;
-$("pace").onchange = (e) => { send({ action: "pace", pace: e.target.value }); e.target.blur(); };
-$("theme").onclick = nextTheme;
-onTheme(() => text("theme", `Theme: ${theme()}`));
 for (const choice of document.getElementsByName("window")) choice.onchange = () => strips.setWindow(choice.value);
-$("in").onclick = () => view.zoomBy(1.35);
-$("out").onclick = () => view.zoomBy(1 / 1.35);
-addEventListener("keydown", (e) => {
-  if (e.target instanceof HTMLSelectElement || e.target instanceof HTMLInputElement || e.ctrlKey || e.metaKey || e.altKey) return;
-  if (e.key === "t") nextTheme();
-  if (e.key === "+") view.zoomBy(1.35);
-  if (e.key === "-") view.zoomBy(1 / 1.35);
-  if (e.target instanceof HTMLButtonElement || $("play").disabled) return;
-  if (e.key === " ") { e.preventDefault(); toggle(); }
-  if (e.key === ".") step();
-  if (e.key === "ArrowLeft" && frame?.run.external_decider) change("left");
-  if (e.key === "ArrowRight" && frame?.run.external_decider) change("right");
-});
-
-enable(false);
+enable(null);
 connect();

@@ -1,0 +1,142 @@
+//! Who may ask, with what, and what a browser may make of the answer.
+
+use std::time::Duration;
+
+use axum::body::{Body, to_bytes};
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderValue, Method, header};
+use axum::middleware::Next;
+use axum::response::Response;
+
+use super::api;
+
+/// Longest body, bytes: a control is a line.
+const MAX_BODY_BYTES: usize = 16_384;
+/// A body arrives within this time.
+const BODY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// What the page may load and do: nothing from elsewhere. Plotly writes style elements.
+const PAGE_POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' \
+     data: blob:; connect-src 'self'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+);
+/// A report has all in one file, and talks to nobody.
+const REPORT_POLICY: HeaderValue = HeaderValue::from_static(
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: \
+     blob:; frame-ancestors 'none'; base-uri 'none'; form-action 'none'",
+);
+
+/// Refuses requests that another web site makes through the user's browser, and bodies that are
+/// too long, too slow or no JSON; says to browsers what an answer may do.
+pub(super) async fn gate(request: Request, next: Next) -> Response {
+    let policy = if request.uri().path() == "/report" { REPORT_POLICY } else { PAGE_POLICY };
+    let mut response = if is_own(request.method(), request.headers()) {
+        match with_body(request).await {
+            Ok(request) => next.run(request).await,
+            Err(refused) => refused,
+        }
+    } else {
+        api::foreign()
+    };
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_SECURITY_POLICY, policy);
+    headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
+    headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
+    let same_origin = HeaderValue::from_static("same-origin");
+    headers.insert("cross-origin-resource-policy", same_origin);
+    response
+}
+
+/// The request with its body in memory.
+async fn with_body(request: Request) -> Result<Request, Response> {
+    let (head, body) = request.into_parts();
+    let announced = text(&head.headers, header::CONTENT_LENGTH.as_str());
+    let announced_bytes = announced.and_then(|l| l.parse::<u64>().ok()).unwrap_or(0);
+    if announced_bytes > MAX_BODY_BYTES as u64 {
+        return Err(api::body_not_read());
+    }
+    if head.method == Method::POST && !is_json(&head.headers) {
+        return Err(api::not_json());
+    }
+    match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, MAX_BODY_BYTES)).await {
+        Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
+        Ok(Err(_)) => Err(api::body_not_read()),
+        Err(_) => Err(api::body_too_slow()),
+    }
+}
+
+fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    headers.get(name).and_then(|value| value.to_str().ok())
+}
+
+/// A form of another site cannot send this without asking first.
+fn is_json(headers: &HeaderMap) -> bool {
+    let kind = text(headers, header::CONTENT_TYPE.as_str()).unwrap_or_default();
+    let kind = kind.split(';').next().unwrap_or_default().trim();
+    kind.eq_ignore_ascii_case("application/json")
+}
+
+/// Whether the user or a page of this server asks: the `Host` is this computer (and not a foreign
+/// name bound to 127.0.0.1), the `Origin` is this server, and the browser does not say that another
+/// site asks. A link on another site may lead to a page.
+fn is_own(method: &Method, headers: &HeaderMap) -> bool {
+    let host = text(headers, header::HOST.as_str()).unwrap_or_default();
+    let origin = text(headers, header::ORIGIN.as_str());
+    let opens_page = method == Method::GET
+        && text(headers, "sec-fetch-mode") == Some("navigate")
+        && text(headers, "sec-fetch-dest") == Some("document");
+    let site = text(headers, "sec-fetch-site").unwrap_or("none");
+    is_loopback(host)
+        && origin.is_none_or(|o| o.strip_prefix("http://") == Some(host))
+        && (opens_page || matches!(site, "none" | "same-origin"))
+}
+
+fn is_loopback(host: &str) -> bool {
+    let name = match host.rsplit_once(':') {
+        Some((name, port)) if port.parse::<u16>().is_ok() => name,
+        _ => host,
+    };
+    matches!(name, "127.0.0.1" | "localhost" | "[::1]")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_loopback_names_are_served() {
+        for good in ["127.0.0.1:8080", "localhost:8080", "localhost", "[::1]:8080", "[::1]"] {
+            assert!(is_loopback(good), "{good}");
+        }
+        for bad in ["", "evil.example:8080", "127.0.0.1.evil.example", "localhost:x", "::1"] {
+            assert!(!is_loopback(bad), "{bad}");
+        }
+    }
+
+    #[test]
+    fn another_site_may_link_to_a_page_and_nothing_else() {
+        let asks = |method: Method, headers: &[(&'static str, &'static str)]| {
+            let own = [("host", "127.0.0.1:8080")];
+            let all = own.iter().chain(headers);
+            let all = all.map(|(name, value)| {
+                (header::HeaderName::from_static(name), HeaderValue::from_static(value))
+            });
+            is_own(&method, &all.collect())
+        };
+        assert!(asks(Method::POST, &[]), "a program");
+        assert!(asks(Method::POST, &[("origin", "http://127.0.0.1:8080")]));
+        for origin in ["null", "http://evil.example", "https://127.0.0.1:8080", "http://localhost"]
+        {
+            assert!(!asks(Method::POST, &[("origin", origin)]), "{origin}");
+        }
+        let link = [("sec-fetch-mode", "navigate"), ("sec-fetch-dest", "document")];
+        let frame = [("sec-fetch-mode", "navigate"), ("sec-fetch-dest", "iframe")];
+        for site in ["cross-site", "same-site"] {
+            let from = [("sec-fetch-site", site)];
+            assert!(asks(Method::GET, &[&from[..], &link].concat()), "a link");
+            assert!(!asks(Method::POST, &[&from[..], &link].concat()), "a form");
+            assert!(!asks(Method::GET, &[&from[..], &frame].concat()), "a frame");
+            assert!(!asks(Method::GET, &from), "a picture");
+        }
+    }
+}

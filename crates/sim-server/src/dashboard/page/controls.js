@@ -1,0 +1,83 @@
+// Buttons, fields and keys: what they ask of the run, and what it refuses.
+import { nextTheme, onTheme, theme } from "/assets/theme.js";
+
+const $ = (id) => document.getElementById(id);
+const KMH = 3.6;
+const ANSWER_SHOWN_MS = 8000;
+let hideAnswer = null;
+
+// What was refused is said in the server's words.
+function say(words) {
+  clearTimeout(hideAnswer);
+  $("answer").textContent = words;
+  $("answer").hidden = words === "";
+  if (words !== "") hideAnswer = setTimeout(() => say(""), ANSWER_SHOWN_MS);
+}
+
+async function ask(body) {
+  const headers = { "Content-Type": "application/json" };
+  try {
+    const answer = await fetch("/api/v1/control", { method: "POST", headers, body });
+    say(answer.ok ? "" : (await answer.json()).error);
+    return answer.ok;
+  } catch {
+    say("the program does not answer");
+    return false;
+  }
+}
+
+const send = (command) => ask(JSON.stringify(command));
+
+// What can be asked of a run in this state; null: there is none.
+export function enable(state) {
+  const drives = state === "running" || state === "paused";
+  for (const id of ["play", "step", "pace", "left", "right", "set-speed", "until"]) $(id).disabled = !drives;
+  $("again").disabled = state === null;
+}
+
+export function selectPace(pace) {
+  const select = $("pace");
+  if (![...select.options].some((o) => o.value === pace)) select.add(new Option(`${pace}×`, pace));
+  select.value = pace;
+}
+
+export function startControls(view, frame) {
+  const paused = async () => frame()?.run.state === "paused" || send({ action: "pause" });
+  const toggle = () => send({ action: frame()?.run.state === "paused" ? "play" : "pause" });
+  const step = async () => await paused() && send({ action: "step", ticks: 10 });
+  const change = (to) => send({ action: "lane_change", to });
+  $("play").onclick = toggle;
+  $("left").onclick = () => change("left");
+  $("right").onclick = () => change("right");
+  $("step").onclick = step;
+  $("pace").onchange = (e) => { send({ action: "pace", pace: e.target.value }); e.target.blur(); };
+  $("theme").onclick = nextTheme;
+  onTheme(() => { $("theme").textContent = `Theme: ${theme()}`; });
+  $("in").onclick = () => view.zoomBy(1.35);
+  $("out").onclick = () => view.zoomBy(1 / 1.35);
+
+  const onSubmit = (form, act) => { $(form).onsubmit = (e) => { e.preventDefault(); act(); }; };
+  onSubmit("set-speed-form", () => send({ action: "set_speed", speed_m_s: $("set-speed-kmh").valueAsNumber / KMH }));
+  onSubmit("until-form", async () => {
+    const time_s = $("until-s").valueAsNumber;
+    return await paused() && send({ action: "step_until", time_s });
+  });
+  // A seed may be larger than a number of JavaScript is exact
+  onSubmit("again-form", () => {
+    const seed = $("seed").value.trim();
+    return ask(seed === "" ? '{"action":"reset"}' : `{"action":"reset","seed":${/^\d+$/.test(seed) ? seed : JSON.stringify(seed)}}`);
+  });
+
+  addEventListener("keydown", (e) => {
+    if (e.target instanceof HTMLSelectElement || e.target instanceof HTMLInputElement || e.ctrlKey || e.metaKey || e.altKey) return;
+    if (e.key === "t") nextTheme();
+    if (e.key === "+") view.zoomBy(1.35);
+    if (e.key === "-") view.zoomBy(1 / 1.35);
+    const isControl = e.target instanceof HTMLButtonElement || e.target instanceof HTMLElement && e.target.tagName === "SUMMARY";
+    if (isControl || $("play").disabled) return;
+    if (e.key === " ") { e.preventDefault(); toggle(); }
+    if (e.key === ".") step();
+    if (e.key === "ArrowLeft" && frame()?.run.external_decider) change("left");
+    if (e.key === "ArrowRight" && frame()?.run.external_decider) change("right");
+  });
+}
