@@ -7,8 +7,8 @@
 //! score already ([`crate::course`]).
 
 use crate::evidence::Evidence;
-use crate::hypothesis::CATALOGUE;
-use crate::param::{PARAMS, Theta};
+use crate::hypothesis::{CATALOGUE, Hypothesis};
+use crate::param::{PARAMS, Spec, Theta};
 use crate::refit::Fit;
 use crate::screen::{Candidate, Screen, outside};
 
@@ -134,17 +134,15 @@ impl dyn Evidence + '_ {
         };
         let mut set = best.set.clone();
         set.push(c.hypothesis);
-        let fits = starts.iter().filter_map(|start| {
+        let sides = sides(hyp, &c.sizes);
+        let fits = starts.iter().flat_map(|start| sides.iter().map(move |sizes| (start, sizes)));
+        let fits = fits.filter_map(|(start, sizes)| {
             let mut theta = best.theta;
             for (p, start) in hyp.shapes.iter().zip(start) {
                 theta[*p as usize] = *start;
             }
-            for (p, linear) in hyp.sizes.iter().zip(&c.sizes) {
-                let s = p.spec();
-                let little = 0.5 * s.step * if hyp.sign < 0.0 { -1.0 } else { 1.0 };
-                // The sign of what is not linear decides where a fit ends.
-                let from = if hyp.nonlinear() { linear.clamp(s.lo, s.hi) } else { little };
-                theta[*p as usize] = self.zero()[*p as usize] + from;
+            for (p, size) in hyp.sizes.iter().zip(sizes) {
+                theta[*p as usize] = self.zero()[*p as usize] + size;
             }
             self.fit(&set, &theta, zero_norm)
         });
@@ -203,5 +201,38 @@ impl dyn Evidence + '_ {
         }
         debug_assert_eq!(theta.len(), PARAMS);
         (set, theta)
+    }
+}
+
+/// Sizes from which a hypothesis is fitted. What is linear needs one start, near nothing. Else the sign
+/// decides where a fit ends (a wind from the wrong side pushes the right way with its force further
+/// back): that of the linear model, and one prior deviation to every side.
+fn sides(hyp: &Hypothesis, linear: &[f64]) -> Vec<Vec<f64>> {
+    let specs = || hyp.sizes.iter().map(|p| p.spec());
+    if !hyp.nonlinear() {
+        let sign = if hyp.sign < 0.0 { -1.0 } else { 1.0 };
+        return vec![specs().map(|s| 0.5 * s.step * sign).collect()];
+    }
+    let mut out = vec![specs().zip(linear).map(|(s, x)| x.clamp(s.lo, s.hi)).collect()];
+    for signs in 0..1_u32 << hyp.sizes.len() {
+        let side = |(k, s): (usize, &Spec)| if signs >> k & 1 == 0 { s.prior } else { -s.prior };
+        out.push(specs().enumerate().map(side).collect());
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wind_is_fitted_from_every_side_and_what_is_linear_from_near_nothing() {
+        let of = |id: &str| CATALOGUE.iter().find(|h| h.id == id).unwrap();
+        let wind = sides(of("wind"), &[-6.5, 100.0]);
+        assert_eq!(wind[0], [-6.5, 20.0]);
+        for signs in [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]] {
+            assert!(wind[1..].contains(&signs.map(|x| 4.0 * x).to_vec()), "{signs:?}");
+        }
+        assert_eq!(sides(of("mass"), &[0.3]), [[0.005]]);
     }
 }
