@@ -27,13 +27,16 @@ from tractrix._truck_model import TruckModel
 from tractrix._world import World
 
 if TYPE_CHECKING:
+    from tractrix._client import Client, Refused
     from tractrix._vector_env import VectorEnv
 
 __all__ = [
     "SCENE_DTYPE",
+    "Client",
     "Decision",
     "Ego",
     "Policy",
+    "Refused",
     "Snapshot",
     "TruckModel",
     "VectorEnv",
@@ -60,7 +63,12 @@ if find_spec("gymnasium") is not None:
 
 
 def __getattr__(name: str) -> Any:
-    """`VectorEnv` is there as soon as it is asked for: it needs Gymnasium (`tractrix[gym]`)."""
+    """What needs another package is there as soon as it is asked for: `VectorEnv` (`tractrix[gym]`),
+    `Client` and its `Refused` (`tractrix[client]`)."""
+    if name in ("Client", "Refused"):
+        from tractrix import _client
+
+        return getattr(_client, name)
     if name == "VectorEnv":
         from tractrix._vector_env import VectorEnv
 

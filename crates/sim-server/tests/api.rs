@@ -182,6 +182,28 @@ fn silent_clients_cannot_keep_others_out() {
     assert!(first_line(&mut late).contains(" 408 "), "a body that does not come");
 }
 
+/// The paths of a session are those without one, as long as there is one session.
+#[test]
+fn the_one_session_is_listed_and_others_are_not_there() {
+    let run = Run::start(&["--seed", "11", "--pace", "max"]);
+    run.act(r#"{"action": "pause"}"#);
+    let (_, all) = run.ask("GET", "/api/v1/sessions", "", b"");
+    let (status, one) = run.ask("GET", "/api/v1/sessions/default", "", b"");
+    assert_eq!((status, &all["sessions"]), (200, &serde_json::json!([one])));
+    assert_eq!((&one["seed"], &one["state"]), (&11.into(), &"paused".into()));
+    assert_eq!(one["scenario"], "flat");
+    let path = |what: &str| format!("/api/v1/sessions/default/{what}");
+    assert_eq!(run.ask("GET", &path("state"), "", b"").1["run_id"], run.state()["run_id"]);
+    let step = br#"{"action": "step", "ticks": 5, "wait": true}"#;
+    assert_eq!(run.ask("POST", &path("control"), "", step).0, 200);
+    for missing in ["", "/state", "/control", "/road"] {
+        let other = format!("/api/v1/sessions/other{missing}");
+        let method = if missing == "/control" { "POST" } else { "GET" };
+        refused(&run.ask(method, &other, "", b"{}"), 404, "no_session", "\"other\"");
+    }
+    refused(&run.ask("GET", &path("nothing"), "", b""), 404, "not_found", "nothing");
+}
+
 /// The body of an answer of any kind.
 fn text(run: &Run, path: &str) -> String {
     let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");

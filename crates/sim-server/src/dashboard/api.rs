@@ -14,7 +14,7 @@ use crate::failure::one_line;
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
 use crate::session::{self, Acted, Command, Handle, Refused, Wish};
 
-fn json(status: StatusCode, body: String) -> Response {
+pub(super) fn json(status: StatusCode, body: String) -> Response {
     (status, [(header::CONTENT_TYPE, "application/json")], body).into_response()
 }
 
@@ -27,6 +27,12 @@ fn error(status: StatusCode, code: &str, why: &str) -> Response {
 /// A path that is not there.
 pub(super) fn not_found(path: &str) -> Response {
     error(StatusCode::NOT_FOUND, "not_found", &format!("nothing at {path}"))
+}
+
+/// A session that is not there.
+pub(super) fn no_session(id: &str) -> Response {
+    let why = format!("no session {id:?}; there is \"{}\"", super::sessions::DEFAULT);
+    error(StatusCode::NOT_FOUND, "no_session", &why)
 }
 
 /// A path that is there for another method.

@@ -14,6 +14,7 @@ mod metrics;
 mod publisher;
 mod road_view;
 mod server;
+mod sessions;
 mod socket;
 mod strip;
 

@@ -10,7 +10,7 @@ use axum::middleware;
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 
-use super::{Shared, api, assets, connections, gate, socket};
+use super::{Shared, api, assets, connections, gate, sessions, socket};
 use crate::failure::Failure;
 
 /// The loopback listener of the dashboard. Port 0 takes any free port.
@@ -52,15 +52,25 @@ impl Dashboard {
     }
 }
 
-fn router(shared: Arc<Shared>) -> Router {
+/// What there is of a session; the paths without one are those of the session `default`.
+fn session() -> Router<Arc<Shared>> {
     Router::new()
-        .route("/api/v1/state", get(api::state))
-        .route("/api/v1/summary", get(api::summary))
-        .route("/api/v1/road", get(api::road))
+        .route("/state", get(api::state))
+        .route("/summary", get(api::summary))
+        .route("/road", get(api::road))
+        .route("/control", post(api::control))
+}
+
+fn router(shared: Arc<Shared>) -> Router {
+    let known = || middleware::from_fn(sessions::known);
+    Router::new()
+        .nest("/api/v1", session())
+        .route("/api/v1/sessions", get(sessions::list))
+        .route("/api/v1/sessions/{session}", get(sessions::one).layer(known()))
+        .nest("/api/v1/sessions/{session}", session().layer(known()))
         .route("/api/v1/health", get(api::health))
         .route("/api/v1/ready", get(api::ready))
         .route("/api/v1/metrics", get(api::metrics))
-        .route("/api/v1/control", post(api::control))
         .route("/report", get(report))
         .route("/ws", get(socket::upgrade))
         .fallback(page)

@@ -128,7 +128,7 @@ impl Drive {
     pub(crate) fn run(mut self) -> Ended {
         let mut failure = self.job.world.attach_ghost().map_err(Failure::work).err();
         self.enter(self.job.state);
-        if failure.is_none() && self.stands() {
+        if failure.is_none() {
             self.show_start();
         }
         let reason = loop {
@@ -195,6 +195,9 @@ impl Drive {
 
     /// A run that stands at its start is seen as its first tick will find it: in a copy.
     fn show_start(&mut self) {
+        if self.tick > 0 || !self.stands() {
+            return;
+        }
         let mut copy = self.job.world.clone();
         let mut views = Views { publisher: self.job.publisher.as_mut(), handle: &self.job.handle };
         if copy.tick(&mut views).is_ok() {
@@ -254,11 +257,16 @@ impl Drive {
         self.job.handle.note_state(state);
     }
 
-    /// Stands still, also in the middle of a step; who waits for its end is answered.
-    fn pause(&mut self) {
+    /// Ends a step in its middle; who waits for its end is answered.
+    fn end_step(&mut self) {
         self.answer_waiting();
         self.steps = 0;
+    }
+
+    fn pause(&mut self) {
+        self.end_step();
         self.enter(State::Paused);
+        self.show_start();
     }
 
     fn act(&mut self, Asked { command, reply }: Asked) {
@@ -269,7 +277,7 @@ impl Drive {
         let now = self.start.elapsed();
         let done = match command {
             Command::Play => {
-                self.pause();
+                self.end_step();
                 self.enter(State::Playing);
                 self.pacer.restart(self.pacer.pace(), now);
                 Ok(())

@@ -188,6 +188,11 @@ impl Handle {
         Arc::clone(&self.view().scenario)
     }
 
+    /// The seed of the run.
+    pub(crate) fn seed(&self) -> u64 {
+        self.view().seed
+    }
+
     /// The bodies of the latest tick.
     pub(crate) fn bodies(&self) -> Bodies {
         self.view().bodies.clone()

@@ -1,0 +1,90 @@
+"""A server is driven from Python, and the run has the bits of the same world in this process."""
+
+import json
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import tractrix
+from program import program
+
+httpx = pytest.importorskip("httpx", reason="httpx is not installed: tractrix[client]")
+
+SEED = 2**64 - 1
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("client") / "out"
+
+
+@pytest.fixture(scope="module")
+def client(out: Path) -> Iterator[tractrix.Client]:
+    words: list[str | Path] = [
+        "run",
+        "medium-15",
+        "--decider",
+        "external",
+        "--pace",
+        "max",
+    ]
+    words += ["--port", "0", "--keep-open", "--out", out]
+    with subprocess.Popen(
+        [program(), *words], stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        address = re.search(r"http://[0-9.:]+", process.stderr.readline())
+        assert address is not None
+        with tractrix.Client(address.group()) as client:
+            yield client
+        process.kill()
+
+
+def test_commands_act_or_are_refused_with_a_code(client: tractrix.Client) -> None:
+    session = client.session()
+    assert session.play().state == "playing"
+    with pytest.raises(tractrix.Refused, match="pause it first") as refused:
+        session.step(10)
+    assert (refused.value.status, refused.value.code) == (409, "wrong_state")
+    with pytest.raises(tractrix.Refused, match="pace") as refused:
+        session.pace(-1.0)
+    assert refused.value.code == "wrong_value"
+    with pytest.raises(tractrix.Refused) as refused:
+        client.session("other")
+    assert refused.value.code == "no_session"
+    assert session.pause().state == "paused"
+    session.set_speed(20.0)
+    seen = (session.state()["run"]["set_speed_m_s"] for _ in range(10_000))
+    assert 20.0 in seen
+
+
+def test_a_run_in_lockstep_has_the_bits_of_a_world_in_this_process(
+    client: tractrix.Client, out: Path
+) -> None:
+    session = client.session()
+    assert [s.id for s in client.sessions()] == [session.id] == ["default"]
+    session.pause()
+    assert session.reset(seed=SEED).tick == 0
+    assert session.info()["seed"] == SEED
+    assert session.step(1000).time_s == pytest.approx(10.0)
+    session.lane_change("left")
+    acted = session.step_until(30.0)
+    assert (acted.tick, acted.state) == (3000, "paused")
+    assert session.road()["length_m"] > 0
+    session.stop()
+    summary = json.loads((out / "run-2" / "summary.json").read_text())
+    with tractrix.World("medium-15", seed=SEED, decider="external") as world:
+        world.step(1000)
+        world.request_lane_change("left")
+        world.step(2000)
+        assert summary["state_hash"] == world.summary()["state_hash"]
+
+
+def test_nobody_answers() -> None:
+    with (
+        tractrix.Client("http://127.0.0.1:9") as nobody,
+        pytest.raises(httpx.TransportError),
+    ):
+        nobody.health()
