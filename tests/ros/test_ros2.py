@@ -380,6 +380,12 @@ def test_quitting_ends_the_program_with_its_summary(
     assert run.wait(timeout=30) == 0
     summary = json.loads((folder / "run-3" / "summary.json").read_text())
     assert summary["duration_s"] == pytest.approx(0.99), "the last of 100 ticks"
+    # The world that was loaded and stepped over ROS 2 is that of the command line, bit for bit
+    alone = folder.parent / "alone"
+    words = ["run", "flat", "--headless", "--duration", "1", "--out", str(alone)]
+    subprocess.run([SERVER, *words], check=True, capture_output=True, timeout=60)
+    same = json.loads((alone / "summary.json").read_text())
+    assert summary["state_hash"] == same["state_hash"]
 
 
 def test_a_domain_that_cannot_be_is_named(tmp_path: Path) -> None:
