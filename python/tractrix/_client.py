@@ -14,7 +14,8 @@ class Refused(Exception):
 
     Attributes:
         status: Status of the answer.
-        code: What was wrong, for programs: `wrong_state`, `wrong_value`, ...
+        code: What was wrong, for programs: the last part of the problem's `type`, `wrong_state`,
+            `wrong_value`, ...
     """
 
     def __init__(self, status: int, code: str, why: str) -> None:
@@ -105,10 +106,16 @@ def _answer(answer: httpx.Response) -> dict[str, Any]:
     try:
         body: dict[str, Any] = answer.json()
     except ValueError:
-        body = {"code": "no_json", "error": f"status {answer.status_code}, no JSON"}
-    if answer.is_success and "code" not in body:
+        body = {"type": "urn:tractrix:no_json", "detail": "the answer is no JSON"}
+        raise _refused(answer, body) from None
+    if answer.is_success:
         return body
-    raise Refused(answer.status_code, str(body.get("code")), str(body.get("error")))
+    raise _refused(answer, body)
+
+
+def _refused(answer: httpx.Response, body: dict[str, Any]) -> Refused:
+    code = str(body.get("type", "")).rpartition(":")[2]
+    return Refused(answer.status_code, code, str(body.get("detail", "")))
 
 
 class Session:

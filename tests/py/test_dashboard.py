@@ -585,7 +585,7 @@ def test_other_web_sites_cannot_ask(server: Path, tmp_path: Path) -> None:
             )
             urllib.request.urlopen(post, timeout=10)
         assert refused.value.code == 400
-        assert "fly" in json.load(refused.value)["error"]
+        assert "fly" in json.load(refused.value)["detail"]
 
 
 def test_a_run_is_driven_to_a_time_and_begun_again_from_the_page(

@@ -68,8 +68,10 @@ impl Run {
         let mut answer = String::new();
         stream.read_to_string(&mut answer).unwrap();
         let (head, body) = answer.split_once("\r\n\r\n").unwrap_or_else(|| panic!("{answer}"));
-        let status = head.split_whitespace().nth(1).unwrap().parse().unwrap();
-        assert!(head.to_ascii_lowercase().contains("content-type: application/json"), "{head}");
+        let status: u16 = head.split_whitespace().nth(1).unwrap().parse().unwrap();
+        let kind = if status < 400 { "application/json" } else { "application/problem+json" };
+        let head = head.to_ascii_lowercase();
+        assert!(head.contains(&format!("content-type: {kind}")), "{head}");
         (status, serde_json::from_str(body).unwrap())
     }
 
@@ -103,7 +105,7 @@ impl Run {
             if status == 200 {
                 return state;
             }
-            assert_eq!(state["code"], "no_tick_yet");
+            assert_eq!(state["type"], "urn:tractrix:no_tick_yet");
             std::thread::sleep(Duration::from_millis(100));
         }
         panic!("no frame")
@@ -119,8 +121,10 @@ impl Drop for Run {
 
 fn refused(answer: &(u16, Value), status: u16, code: &str, words: &str) {
     let (got, body) = answer;
-    assert_eq!((*got, &body["code"], &body["schema"]), (status, &code.into(), &1.into()), "{body}");
-    assert!(body["error"].as_str().unwrap().contains(words), "{body}");
+    let kind = format!("urn:tractrix:{code}");
+    assert_eq!((*got, &body["type"], &body["schema"]), (status, &kind.into(), &1.into()), "{body}");
+    assert_eq!(body["status"], status);
+    assert!(body["detail"].as_str().unwrap().contains(words), "{body}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod support;
 use std::net::TcpListener;
 use std::path::Path;
 
-use support::{refused, scenario_with, server};
+use support::{program, refused, scenario_with, server};
 
 #[test]
 fn an_unknown_flag_is_named() {
@@ -67,14 +67,23 @@ fn a_bus_that_cannot_be_used_is_named() {
 
 #[test]
 fn what_the_contract_names_and_this_version_lacks_says_so() {
-    for option in [&["--ros2"][..], &["--foxglove"]] {
-        let line = refused(&[&["run", "--headless"], option].concat());
-        assert!(line.contains("not supported"), "{option:?}: {line}");
-    }
+    let line = refused(&["run", "--headless", "--foxglove"]);
+    assert!(line.contains("not supported"), "{line}");
     assert!(refused(&["run", "--headless", "--decider", "dqn:none.safetensors"]).contains("none"));
     assert!(refused(&["run", "--headless", "--decider", "dqn:"]).contains("dqn:FILE"));
     assert!(refused(&["run", "--headless", "--decider", "rules:near"]).contains("rules:near"));
     assert!(refused(&["run", "--headless", "--decider", "rules:-3"]).contains("-3"));
+}
+
+#[test]
+fn a_ros_domain_that_cannot_be_is_named() {
+    for wrong in ["300", "-1", "one"] {
+        let words = ["run", "flat", "--headless", "--ros2"];
+        let output = program().args(words).env("ROS_DOMAIN_ID", wrong).output().unwrap();
+        let line = String::from_utf8(output.stderr).unwrap();
+        assert_eq!((output.status.code(), line.lines().count()), (Some(2), 1), "{line}");
+        assert!(line.contains(&format!("ROS_DOMAIN_ID={wrong}: expected")), "{line}");
+    }
 }
 
 #[test]

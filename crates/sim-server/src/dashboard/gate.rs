@@ -8,7 +8,7 @@ use axum::http::{HeaderMap, HeaderValue, Method, header};
 use axum::middleware::Next;
 use axum::response::Response;
 
-use super::api;
+use super::problem;
 
 /// Longest body, bytes: a control is a line.
 const MAX_BODY_BYTES: usize = 16_384;
@@ -36,7 +36,7 @@ pub(super) async fn gate(request: Request, next: Next) -> Response {
             Err(refused) => refused,
         }
     } else {
-        api::foreign()
+        problem::foreign()
     };
     let headers = response.headers_mut();
     headers.insert(header::CONTENT_SECURITY_POLICY, policy);
@@ -53,15 +53,15 @@ async fn with_body(request: Request) -> Result<Request, Response> {
     let announced = text(&head.headers, header::CONTENT_LENGTH.as_str());
     let announced_bytes = announced.and_then(|l| l.parse::<u64>().ok()).unwrap_or(0);
     if announced_bytes > MAX_BODY_BYTES as u64 {
-        return Err(api::body_not_read());
+        return Err(problem::body_not_read());
     }
     if head.method == Method::POST && !is_json(&head.headers) {
-        return Err(api::not_json());
+        return Err(problem::not_json());
     }
     match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, MAX_BODY_BYTES)).await {
         Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
-        Ok(Err(_)) => Err(api::body_not_read()),
-        Err(_) => Err(api::body_too_slow()),
+        Ok(Err(_)) => Err(problem::body_not_read()),
+        Err(_) => Err(problem::body_too_slow()),
     }
 }
 

@@ -10,7 +10,7 @@ use axum::middleware;
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 
-use super::{Shared, api, assets, connections, gate, sessions, socket};
+use super::{Shared, api, assets, connections, gate, problem, sessions, socket};
 use crate::failure::Failure;
 
 /// The loopback listener of the dashboard. Port 0 takes any free port.
@@ -74,18 +74,18 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/report", get(report))
         .route("/ws", get(socket::upgrade))
         .fallback(page)
-        .method_not_allowed_fallback(api::wrong_method)
+        .method_not_allowed_fallback(problem::wrong_method)
         .layer(middleware::from_fn(gate::gate))
         .with_state(shared)
 }
 
 async fn page(State(shared): State<Arc<Shared>>, uri: Uri) -> Response {
     assets::asset(uri.path(), shared.setting().report.is_some())
-        .unwrap_or_else(|| api::not_found(uri.path()))
+        .unwrap_or_else(|| problem::not_found(uri.path()))
 }
 
 /// The report of the diagnosis that the truck comes from.
 async fn report(State(shared): State<Arc<Shared>>) -> Response {
     let page = |text: &Arc<str>| Html(text.to_string()).into_response();
-    shared.setting().report.as_ref().map_or_else(|| api::not_found("/report"), page)
+    shared.setting().report.as_ref().map_or_else(|| problem::not_found("/report"), page)
 }

@@ -9,7 +9,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 use serde_json::{Value, json};
 
-use super::{Shared, api};
+use super::{Shared, api, problem};
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
 
 /// The session that the program starts with.
@@ -34,7 +34,7 @@ pub(super) async fn known(
 ) -> Response {
     match path.get("session").map(String::as_str) {
         Some(DEFAULT) => next.run(request).await,
-        other => api::no_session(other.unwrap_or_default()),
+        other => problem::no_session(other.unwrap_or_default()),
     }
 }
 

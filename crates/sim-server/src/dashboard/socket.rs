@@ -10,7 +10,7 @@ use axum::response::Response;
 use serde::Serialize;
 
 use super::strip::Strip;
-use super::{Published, Shared, api};
+use super::{Published, Shared, problem};
 use crate::provenance::SCHEMA;
 
 /// New rows of the strip plots are sent at most this often, in frames.
@@ -38,7 +38,7 @@ struct StripRows {
 
 pub(super) async fn upgrade(State(shared): State<Arc<Shared>>, ws: WebSocketUpgrade) -> Response {
     let Ok(place) = Arc::clone(&shared.viewers).try_acquire_owned() else {
-        return api::too_many_viewers();
+        return problem::too_many_viewers();
     };
     let ws = ws.max_message_size(MAX_INCOMING_BYTES).max_frame_size(MAX_INCOMING_BYTES);
     ws.on_upgrade(move |socket| async move {

@@ -11,7 +11,7 @@ mod drive;
 mod handle;
 mod pace;
 
-pub(crate) use command::{Command, Wish};
+pub(crate) use command::{Command, CommandError, Wish};
 pub(crate) use drive::{Drive, Ended, Job, Reply};
 pub(crate) use handle::{Acted, Asked, Handle, Next, Refused, RunState, State, channel};
 pub(crate) use pace::Pace;

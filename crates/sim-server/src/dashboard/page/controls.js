@@ -18,7 +18,7 @@ async function ask(body) {
   const headers = { "Content-Type": "application/json" };
   try {
     const answer = await fetch("/api/v1/control", { method: "POST", headers, body });
-    say(answer.ok ? "" : (await answer.json()).error);
+    say(answer.ok ? "" : (await answer.json()).detail);
     return answer.ok;
   } catch {
     say("the program does not answer");

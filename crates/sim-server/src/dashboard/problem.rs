@@ -1,0 +1,104 @@
+//! Refusals of the API: problem details (RFC 9457). All there are.
+
+use axum::http::{HeaderValue, Method, StatusCode, Uri, header};
+use axum::response::{IntoResponse, Response};
+use serde_json::json;
+
+use crate::failure::one_line;
+use crate::provenance::SCHEMA;
+use crate::session::{CommandError, Refused};
+
+/// A problem: a word for programs and a sentence for people. Whoever came too early is told when
+/// to come again.
+fn problem(status: StatusCode, kind: &str, why: &str) -> Response {
+    let body = json!({
+        "schema": SCHEMA,
+        "type": format!("urn:tractrix:{kind}"),
+        "title": status.canonical_reason(),
+        "status": status.as_u16(),
+        "detail": one_line(why),
+    });
+    let content = [(header::CONTENT_TYPE, "application/problem+json")];
+    let mut response = (status, content, body.to_string()).into_response();
+    if matches!(status, StatusCode::TOO_MANY_REQUESTS | StatusCode::SERVICE_UNAVAILABLE) {
+        response.headers_mut().insert(header::RETRY_AFTER, HeaderValue::from_static("1"));
+    }
+    response
+}
+
+/// A path that is not there.
+pub(super) fn not_found(path: &str) -> Response {
+    problem(StatusCode::NOT_FOUND, "not_found", &format!("nothing at {path}"))
+}
+
+/// A session that is not there.
+pub(super) fn no_session(id: &str) -> Response {
+    let why = format!("no session {id:?}; there is \"{}\"", super::sessions::DEFAULT);
+    problem(StatusCode::NOT_FOUND, "no_session", &why)
+}
+
+/// A path that is there for another method.
+pub(super) async fn wrong_method(method: Method, uri: Uri) -> Response {
+    let why = format!("{} does not take {method}", uri.path());
+    problem(StatusCode::METHOD_NOT_ALLOWED, "method_not_allowed", &why)
+}
+
+/// A request from another web site.
+pub(super) fn foreign() -> Response {
+    problem(StatusCode::FORBIDDEN, "foreign_page", "only pages of this server may ask")
+}
+
+/// A body that is too long, or broke off.
+pub(super) fn body_not_read() -> Response {
+    let why = "the body is too long, or broke off";
+    problem(StatusCode::PAYLOAD_TOO_LARGE, "body_not_read", why)
+}
+
+/// A body that did not arrive in time.
+pub(super) fn body_too_slow() -> Response {
+    problem(StatusCode::REQUEST_TIMEOUT, "body_too_slow", "the body has not arrived in 10 s")
+}
+
+/// A body of another kind.
+pub(super) fn not_json() -> Response {
+    let why = "the body must be JSON: Content-Type: application/json";
+    problem(StatusCode::UNSUPPORTED_MEDIA_TYPE, "not_json", why)
+}
+
+/// One viewer more than there are places.
+pub(super) fn too_many_viewers() -> Response {
+    let why = format!("{} viewers look on already", super::MAX_VIEWERS);
+    problem(StatusCode::TOO_MANY_REQUESTS, "too_many_viewers", &why)
+}
+
+/// No frame yet.
+pub(super) fn no_tick_yet() -> Response {
+    problem(StatusCode::SERVICE_UNAVAILABLE, "no_tick_yet", "no tick has been driven yet")
+}
+
+/// A text that is no command.
+pub(super) fn no_command(why: &CommandError) -> Response {
+    problem(StatusCode::BAD_REQUEST, why.code(), &why.to_string())
+}
+
+/// A session that does not answer.
+pub(super) fn no_answer() -> Response {
+    let why = "the session has not answered; what was asked for may still act";
+    problem(StatusCode::GATEWAY_TIMEOUT, "no_answer", why)
+}
+
+/// A command that did not act.
+pub(super) fn refused(why: &Refused) -> Response {
+    let (status, code) = match why {
+        Refused::TooMany => (StatusCode::TOO_MANY_REQUESTS, "too_many_controls"),
+        Refused::Ended => (StatusCode::CONFLICT, "run_ended"),
+        Refused::WrongState { .. } => (StatusCode::CONFLICT, "wrong_state"),
+        Refused::NoExternalDecider => (StatusCode::CONFLICT, "no_external_decider"),
+        Refused::OutsideBus(_) => (StatusCode::CONFLICT, "outside_bus"),
+        Refused::OneSumo => (StatusCode::CONFLICT, "one_sumo"),
+        Refused::CutShort { .. } => (StatusCode::CONFLICT, "cut_short"),
+        Refused::TooFar { .. } => (StatusCode::UNPROCESSABLE_ENTITY, "too_far"),
+        Refused::Unusable(_) => (StatusCode::UNPROCESSABLE_ENTITY, "unusable"),
+    };
+    problem(status, code, &why.to_string())
+}
