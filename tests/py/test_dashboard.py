@@ -7,18 +7,15 @@ import math
 import os
 import re
 import shutil
-import signal
-import subprocess
 import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
+from running import Run, running
 
 FLAGS = [
     "--headless",
@@ -33,52 +30,6 @@ FLAGS = [
 WAIT_MS = 30_000
 SET_SPEED_IS_20 = """fetch('/api/v1/state').then(a => a.json())
     .then(state => state.run.set_speed_m_s === 20)"""
-
-
-class Run:
-    """A run under way and the address of its dashboard."""
-
-    def __init__(self, process: subprocess.Popen[str], url: str) -> None:
-        self.process = process
-        self.url = url
-
-    def get(self, path: str) -> Any:
-        """A JSON answer of the API."""
-        with urllib.request.urlopen(self.url + path, timeout=10) as answer:
-            return json.load(answer)
-
-    def finish(self) -> int:
-        """Stops the run as Ctrl-C does and waits for it."""
-        self.process.send_signal(signal.SIGINT)
-        return self.process.wait(timeout=60)
-
-
-@contextmanager
-def running(
-    server: Path, folder: Path, *options: str, port: str = "0"
-) -> Iterator[Run]:
-    """Starts a run with a dashboard, on a free port if none is named."""
-    command: list[str | Path] = [
-        server,
-        "run",
-        "--port",
-        port,
-        "--out",
-        folder,
-        *options,
-    ]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stderr is not None
-            said = ""
-            address = None
-            while address is None and (line := process.stderr.readline()):
-                said += line
-                address = re.search(r"http://127\.0\.0\.1:\d+", line)
-            assert address is not None, said
-            yield Run(process, address.group())
-        finally:
-            process.kill()
 
 
 @pytest.fixture(scope="session")

@@ -6,10 +6,11 @@ use std::time::Duration;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::extract::rejection::BytesRejection;
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
-use super::{Shared, problem};
+use super::openapi::{ActedObject, CommandObject, FrameObject, Health};
+use super::{Shared, gate, problem};
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
 use crate::session::{self, Acted, Command, Handle, Refused, Wish};
 
@@ -18,12 +19,14 @@ pub(super) fn json(status: StatusCode, body: String) -> Response {
 }
 
 /// The latest frame.
+#[utoipa::path(get, path = "/state", params(("session" = String, Path, description = "Id of a session: `default`")), responses((status = 200, body = FrameObject)))]
 pub(super) async fn state(State(shared): State<Arc<Shared>>) -> Response {
     let frame = Arc::clone(&shared.frame.borrow().json);
     if frame.is_empty() { problem::no_tick_yet() } else { json(StatusCode::OK, frame.to_string()) }
 }
 
 /// Says that there is a run to look at.
+#[utoipa::path(get, path = "/api/v1/ready", responses((status = 200, body = Health)))]
 pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Response {
     if shared.frame.borrow().json.is_empty() {
         return problem::no_tick_yet();
@@ -32,23 +35,27 @@ pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Response {
 }
 
 /// Counts and times, OpenMetrics.
+#[utoipa::path(get, path = "/api/v1/metrics", responses((status = 200, body = String, content_type = "application/openmetrics-text")))]
 pub(super) async fn metrics(State(shared): State<Arc<Shared>>) -> Response {
     let kind = "application/openmetrics-text; version=1.0.0; charset=utf-8";
     ([(header::CONTENT_TYPE, kind)], shared.metrics.text()).into_response()
 }
 
 /// The summary so far, the final one after the end.
+#[utoipa::path(get, path = "/summary", params(("session" = String, Path, description = "Id of a session: `default`")), responses((status = 200, body = Object)))]
 pub(super) async fn summary(State(shared): State<Arc<Shared>>) -> Response {
     let summary = shared.summary().to_string();
     json(StatusCode::OK, summary)
 }
 
 /// The road's geometry and the truck's lengths.
+#[utoipa::path(get, path = "/road", params(("session" = String, Path, description = "Id of a session: `default`")), responses((status = 200, body = Object)))]
 pub(super) async fn road(State(shared): State<Arc<Shared>>) -> Response {
     json(StatusCode::OK, shared.setting().road.to_string())
 }
 
 /// Says that the server answers.
+#[utoipa::path(get, path = "/api/v1/health", responses((status = 200, body = Health)))]
 pub(super) async fn health() -> Response {
     let body = serde_json::json!({
         "schema": SCHEMA, "status": "ok", "version": VERSION, "git_revision": GIT_REVISION,
@@ -58,10 +65,15 @@ pub(super) async fn health() -> Response {
 
 /// Carries out a command, between two ticks; a step with `"wait": true` is answered when it is
 /// driven.
+#[utoipa::path(post, path = "/control", params(("session" = String, Path, description = "Id of a session: `default`")), request_body = CommandObject, responses((status = 200, body = ActedObject)))]
 pub(super) async fn control(
     State(shared): State<Arc<Shared>>,
+    headers: HeaderMap,
     body: Result<Bytes, BytesRejection>,
 ) -> Response {
+    if !gate::is_json(&headers) {
+        return problem::not_json();
+    }
     let Ok(body) = body else { return problem::body_not_read() };
     let wish = match Wish::from_json(&body) {
         Ok(wish) => wish,

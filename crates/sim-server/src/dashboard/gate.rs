@@ -27,7 +27,7 @@ const REPORT_POLICY: HeaderValue = HeaderValue::from_static(
 );
 
 /// Refuses requests that another web site makes through the user's browser, and bodies that are
-/// too long, too slow or no JSON; says to browsers what an answer may do.
+/// too long or too slow; says to browsers what an answer may do.
 pub(super) async fn gate(request: Request, next: Next) -> Response {
     let policy = if request.uri().path() == "/report" { REPORT_POLICY } else { PAGE_POLICY };
     let mut response = if is_own(request.method(), request.headers()) {
@@ -55,9 +55,6 @@ async fn with_body(request: Request) -> Result<Request, Response> {
     if announced_bytes > MAX_BODY_BYTES as u64 {
         return Err(problem::body_not_read());
     }
-    if head.method == Method::POST && !is_json(&head.headers) {
-        return Err(problem::not_json());
-    }
     match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, MAX_BODY_BYTES)).await {
         Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
         Ok(Err(_)) => Err(problem::body_not_read()),
@@ -69,8 +66,8 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
-/// A form of another site cannot send this without asking first.
-fn is_json(headers: &HeaderMap) -> bool {
+/// Whether a body is JSON: a form of another site cannot send this without asking first.
+pub(super) fn is_json(headers: &HeaderMap) -> bool {
     let kind = text(headers, header::CONTENT_TYPE.as_str()).unwrap_or_default();
     let kind = kind.split(';').next().unwrap_or_default().trim();
     kind.eq_ignore_ascii_case("application/json")

@@ -11,6 +11,7 @@ mod connections;
 mod frame;
 mod gate;
 mod metrics;
+mod openapi;
 mod problem;
 mod publisher;
 mod road_view;

@@ -5,12 +5,14 @@ use std::sync::Arc;
 
 use axum::Router;
 use axum::extract::State;
-use axum::http::Uri;
+use axum::http::{StatusCode, Uri};
 use axum::middleware;
 use axum::response::{Html, IntoResponse, Response};
-use axum::routing::{get, post};
+use axum::routing::get;
+use utoipa_axum::router::OpenApiRouter;
+use utoipa_axum::routes;
 
-use super::{Shared, api, assets, connections, gate, problem, sessions, socket};
+use super::{Shared, api, assets, connections, gate, openapi, problem, sessions, socket};
 use crate::failure::Failure;
 
 /// The loopback listener of the dashboard. Port 0 takes any free port.
@@ -52,25 +54,33 @@ impl Dashboard {
     }
 }
 
-/// What there is of a session; the paths without one are those of the session `default`.
-fn session() -> Router<Arc<Shared>> {
-    Router::new()
-        .route("/state", get(api::state))
-        .route("/summary", get(api::summary))
-        .route("/road", get(api::road))
-        .route("/control", post(api::control))
+/// What there is of a session.
+fn session() -> OpenApiRouter<Arc<Shared>> {
+    OpenApiRouter::new()
+        .routes(routes!(api::state))
+        .routes(routes!(api::summary))
+        .routes(routes!(api::road))
+        .routes(routes!(api::control))
 }
 
 fn router(shared: Arc<Shared>) -> Router {
     let known = || middleware::from_fn(sessions::known);
-    Router::new()
-        .nest("/api/v1", session())
-        .route("/api/v1/sessions", get(sessions::list))
-        .route("/api/v1/sessions/{session}", get(sessions::one).layer(known()))
+    let (documented, document) = OpenApiRouter::with_openapi(openapi::document())
+        .routes(routes!(sessions::list))
+        .merge(OpenApiRouter::new().routes(routes!(sessions::one)).layer(known()))
         .nest("/api/v1/sessions/{session}", session().layer(known()))
-        .route("/api/v1/health", get(api::health))
-        .route("/api/v1/ready", get(api::ready))
-        .route("/api/v1/metrics", get(api::metrics))
+        .routes(routes!(api::health))
+        .routes(routes!(api::ready))
+        .routes(routes!(api::metrics))
+        .split_for_parts();
+    let document: Arc<str> = openapi::text(document).into();
+    documented
+        // The paths without a session are those of the session `default`
+        .nest("/api/v1", session().into())
+        .route(
+            "/api/openapi.json",
+            get(async move || api::json(StatusCode::OK, document.to_string())),
+        )
         .route("/report", get(report))
         .route("/ws", get(socket::upgrade))
         .fallback(page)

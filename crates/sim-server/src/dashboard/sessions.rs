@@ -9,6 +9,7 @@ use axum::middleware::Next;
 use axum::response::Response;
 use serde_json::{Value, json};
 
+use super::openapi::{SessionList, SessionObject};
 use super::{Shared, api, problem};
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
 
@@ -16,12 +17,14 @@ use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
 pub(super) const DEFAULT: &str = "default";
 
 /// All sessions.
+#[utoipa::path(get, path = "/api/v1/sessions", responses((status = 200, body = SessionList)))]
 pub(super) async fn list(State(shared): State<Arc<Shared>>) -> Response {
     let body = json!({ "schema": SCHEMA, "sessions": [object(&shared)] });
     api::json(StatusCode::OK, body.to_string())
 }
 
 /// One session.
+#[utoipa::path(get, path = "/api/v1/sessions/{session}", params(("session" = String, Path, description = "Id of a session: `default`")), responses((status = 200, body = SessionObject)))]
 pub(super) async fn one(State(shared): State<Arc<Shared>>) -> Response {
     api::json(StatusCode::OK, object(&shared).to_string())
 }
