@@ -27,14 +27,13 @@ from simulation_interfaces.srv import GetSimulationState
 
 CALLS = 2_000
 TICKS = 10_000
-DOMAIN = random.Random(os.getpid()).randrange(100, 200)
 WAIT_S = 60.0
 RELIABLE = QoSProfile(depth=TICKS, reliability=ReliabilityPolicy.RELIABLE)
 
 
-def serve(name: str, ready: Any) -> None:
+def serve(domain: int, name: str, ready: Any) -> None:
     """The same service and clock from rclpy, in a process of its own."""
-    rclpy.init(domain_id=DOMAIN)
+    rclpy.init(domain_id=domain)
     node = Node("peer_server")
     node.create_service(GetSimulationState, name, lambda _, answer: answer)
     publisher = node.create_publisher(Clock, "/peer_clock", RELIABLE)
@@ -101,12 +100,13 @@ def lost(node: Node, executor: SingleThreadedExecutor, name: str) -> tuple[int, 
 
 
 def main() -> None:
-    environment = os.environ | {"ROS_DOMAIN_ID": str(DOMAIN)}
+    domain = random.Random(os.getpid()).randrange(100, 200)
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
     for name in ("LD_LIBRARY_PATH", "PYTHONPATH"):
         environment.pop(name, None)
     spawn = multiprocessing.get_context("spawn")
     ready = spawn.Event()
-    peer = spawn.Process(target=serve, args=("/peer_state", ready), daemon=True)
+    peer = spawn.Process(target=serve, args=(domain, "/peer_state", ready), daemon=True)
     peer.start()
     ready.wait(WAIT_S)
     with tempfile.TemporaryDirectory() as folder:
@@ -119,7 +119,7 @@ def main() -> None:
             stderr=subprocess.DEVNULL,
         )
         try:
-            rclpy.init(domain_id=DOMAIN)
+            rclpy.init(domain_id=domain)
             node = Node("measuring")
             executor = SingleThreadedExecutor()
             executor.add_node(node)
