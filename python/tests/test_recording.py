@@ -35,6 +35,23 @@ def test_a_recording_is_the_run(run: Path) -> None:
     assert set(plans["maneuver"]) <= {"keep_lane", "change_left", "change_right"}
 
 
+def test_every_topic_of_a_recording_is_read(tmp_path: Path) -> None:
+    """That the file has every topic is `sim-server`'s own test, `every_topic`."""
+    pytest.importorskip("pandas")
+    from mcap.reader import make_reader
+
+    options = ("--headless", "--vehicle", "bus", "--duration", "2")
+    sim_server("run", *options, "--out", tmp_path)
+    with (tmp_path / "run.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None and summary.statistics is not None
+    counts = summary.statistics.channel_message_counts
+    assert len(summary.channels) > 10
+    for channel in summary.channels.values():
+        rows = tractrix.read_run(tmp_path / "run.mcap", channel.topic)
+        assert len(rows) == counts.get(channel.id, 0), channel.topic
+
+
 def test_what_is_no_recording_is_named(run: Path, tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="nowhere"):
         tractrix.read_run("nowhere.mcap")

@@ -39,6 +39,12 @@ pub enum RecordingError {
         /// Why.
         why: String,
     },
+    /// A file that is being written has been deleted.
+    #[error("{}: it was deleted while it was written", path.display())]
+    Gone {
+        /// The file.
+        path: PathBuf,
+    },
     /// The disk did not take the end of the recording in time.
     #[error("the disk takes nothing: given up after {after_s:.0} s")]
     Stuck {

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufWriter, Seek, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use mcap::records::{MessageHeader, Metadata};
@@ -66,19 +67,32 @@ pub(crate) struct McapFile {
     path: PathBuf,
     writer: Writer<Box<dyn Disk>>,
     channels: BTreeMap<&'static str, Channel>,
+    /// The file itself, where it is one.
+    handle: Option<File>,
+    /// How long it was when its last chunk was closed.
+    whole_bytes: u64,
 }
 
 impl McapFile {
     /// Creates the file; it must be possible to write there.
     pub(crate) fn create(path: &Path) -> Result<Self, RecordingError> {
         let file = File::create(path).map_err(|e| RecordingError::write(path, e))?;
-        Self::on(path, Box::new(BufWriter::new(file)))
+        let handle = file.try_clone().map_err(|e| RecordingError::write(path, e))?;
+        let mut made = Self::on(path, Box::new(BufWriter::new(file)))?;
+        made.handle = Some(handle);
+        Ok(made)
     }
 
     /// The file on a disk.
     pub(crate) fn on(path: &Path, disk: Box<dyn Disk>) -> Result<Self, RecordingError> {
         let writer = write_options().create(disk).map_err(|e| RecordingError::write(path, e))?;
-        Ok(Self { path: path.to_owned(), writer, channels: BTreeMap::new() })
+        Ok(Self {
+            path: path.to_owned(),
+            writer,
+            channels: BTreeMap::new(),
+            handle: None,
+            whole_bytes: 0,
+        })
     }
 
     /// Opens a topic.
@@ -153,16 +167,40 @@ impl McapFile {
 
     /// Closes the chunk and hands everything to the operating system.
     pub(crate) fn flush(&mut self) -> Result<(), RecordingError> {
-        self.writer.flush().map_err(|e| self.failed(e))
+        self.writer.flush().map_err(|e| self.failed(e))?;
+        self.whole_bytes = length_of(self.handle.as_ref(), &self.path)?;
+        Ok(())
+    }
+
+    /// Cuts off what was written behind the last whole chunk: a full disk gets room for a summary.
+    pub(crate) fn cut(self) {
+        drop(self.writer);
+        if let Some(file) = self.handle
+            && self.whole_bytes > 0
+        {
+            // What cannot be cut is left out by `recover`
+            let _ = file.set_len(self.whole_bytes);
+        }
     }
 
     /// Writes the summary section; the file is whole after it.
     pub(crate) fn finish(mut self) -> Result<(), RecordingError> {
         self.writer.finish().map_err(|e| RecordingError::write(&self.path, e))?;
-        self.writer.into_inner().sync().map_err(|e| RecordingError::write(&self.path, e))
+        self.writer.into_inner().sync().map_err(|e| RecordingError::write(&self.path, e))?;
+        length_of(self.handle.as_ref(), &self.path).map(drop)
     }
 
     fn failed(&self, error: mcap::McapError) -> RecordingError {
         RecordingError::write(&self.path, error)
+    }
+}
+
+/// Length of a file that is being written; 0 of what is none.
+fn length_of(file: Option<&File>, path: &Path) -> Result<u64, RecordingError> {
+    let Some(file) = file else { return Ok(0) };
+    let now = file.metadata().map_err(|e| RecordingError::write(path, e))?;
+    match now.is_file() && now.nlink() == 0 {
+        true => Err(RecordingError::Gone { path: path.to_owned() }),
+        false => Ok(now.len()),
     }
 }

@@ -3,7 +3,8 @@
 //! [`messages`] is the pure step from a tick to the messages of its topics ([`TOPICS`]), for a file
 //! or a network alike ([`static_frames`] and [`lanes_at_start`] come before the first tick). [`Recording`] takes the ticks in the world's thread and hands them over a bounded
 //! channel to a writer thread; when the disk is slower than the world, the world waits and nothing
-//! is left out, or ([`Backlog::Drop`], on a truck) the world goes on and the gap is counted. Chunks are closed every simulated second, so that a crash loses one second at most;
+//! is left out, or ([`Backlog::Drop`], on a truck) the world goes on and the gap is counted. Chunks are closed
+//! twice a simulated second, so that a crash loses less than one second;
 //! [`recover`] makes a whole file of the rest. [`Reader`] reads fields by name, [`Inputs`] what the
 //! stack and its bus were given.
 //!

@@ -16,7 +16,7 @@ use crate::topic::{CAN_FRAMES, CAN_TICKS, FIX, INPUT, LIMITS, TOPICS, TopicMessa
 /// Name of the record that says how many notes were left out at its place.
 pub(crate) const GAP_RECORD: &str = "gap";
 /// Chunks are closed this often (simulated).
-const FLUSH_PERIOD: Time = Time(1_000_000_000);
+const FLUSH_PERIOD: Time = Time(500_000_000);
 
 /// A note in the queue.
 pub(crate) struct Queued {
@@ -102,13 +102,17 @@ impl Writer {
         end: &Receiver<RunEnd>,
     ) -> (Time, Result<(), RecordingError>) {
         let mut kept = Time::ZERO;
-        let mut written = self.write_all(notes, &mut kept);
-        if written.is_ok()
-            && let Ok(end) = end.try_recv()
-        {
-            written = self.finish(&end);
-        }
-        (kept, written)
+        let written = self.write_all(notes, &mut kept);
+        let written = match (written, end.try_recv()) {
+            (Ok(()), Ok(end)) => self.finish(&end),
+            (Err(why @ RecordingError::Write { .. }), _) => {
+                self.file.cut();
+                Err(why)
+            }
+            (written, _) => written,
+        };
+        let is_gone = matches!(written, Err(RecordingError::Gone { .. }));
+        (if is_gone { Time::ZERO } else { kept }, written)
     }
 
     fn finish(mut self, end: &RunEnd) -> Result<(), RecordingError> {

@@ -69,6 +69,14 @@ impl Failure {
         failure.hint(&format!("its first {kept_s:.0} s are saved by `sim-server recover {path}`"))
     }
 
+    /// The failure of something that could be done when the work began.
+    #[must_use]
+    pub(crate) fn under_way(self) -> Self {
+        match self {
+            Self::Input(why) | Self::Work(why) => Self::Work(why),
+        }
+    }
+
     /// The same failure with what helps.
     #[must_use]
     pub(crate) fn hint(self, what: &str) -> Self {

@@ -5,7 +5,8 @@
 mod support;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
 
 use support::{program, refused, server};
 
@@ -119,6 +120,11 @@ fn a_disk_that_fills_up_ends_a_run_with_one_line_that_says_what_helps() {
     let recovered = server(&["recover", text(&file)]);
     let said = String::from_utf8(recovered.stdout).unwrap();
     assert!(recovered.status.success() && said.contains(" messages on "), "{said}");
+    assert!(
+        file.metadata().unwrap().len() < 999_936,
+        "cut where its last chunk ends: there is room"
+    );
+    assert!(out.join("summary.json").exists());
     for entry in std::fs::read_dir(&out).unwrap() {
         assert!(entry.unwrap().metadata().unwrap().len() > 100, "no empty file is left");
     }
@@ -127,6 +133,62 @@ fn a_disk_that_fills_up_ends_a_run_with_one_line_that_says_what_helps() {
     let line = full(&with_little_room(2_048, &["run", "--headless", "--out", text(&again)]));
     assert!(line.contains("run.mcap") && !line.contains("recover"), "nothing to save: {line}");
     assert!(!again.exists(), "an empty recording is no use to anyone");
+}
+
+/// A run under way, twenty times real time for a minute.
+fn under_way(out: &Path, temporary: &Path) -> Child {
+    let run = ["run", "flat", "--headless", "--pace", "20", "--duration", "1200", "--out"];
+    let mut command = program();
+    command.args(run).arg(out).env("TMPDIR", temporary).stderr(Stdio::piped());
+    let child = command.spawn().unwrap();
+    let recording = out.join("run.mcap");
+    for _ in 0..1000 {
+        if recording.metadata().is_ok_and(|m| m.len() > 100_000) {
+            return child;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("nothing was recorded");
+}
+
+/// The line of a run that could not go on or not be written: exit code 1, its summary elsewhere.
+fn summary_elsewhere(run: Child, temporary: &Path) -> String {
+    let output = run.wait_with_output().unwrap();
+    let line = String::from_utf8(output.stderr).unwrap();
+    assert_eq!((output.status.code(), line.lines().count()), (Some(1), 1), "{line}");
+    let (_, file) = line.trim_end().split_once("summary: ").expect(&line);
+    assert!(Path::new(file).starts_with(temporary), "{line}");
+    let summary: serde_json::Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
+    assert!(summary["duration_s"].as_f64().unwrap() > 0.5, "{summary}");
+    line
+}
+
+/// A run whose folder was deleted drove to its end, wrote into a file without a name, and ended as
+/// if its command line had been wrong.
+#[test]
+fn a_run_whose_folder_vanishes_ends_and_its_summary_is_kept_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, temporary) = (folder.path().join("out"), tempfile::tempdir().unwrap());
+    let run = under_way(&out, temporary.path());
+    std::fs::remove_dir_all(&out).unwrap();
+    let line = summary_elsewhere(run, temporary.path());
+    assert!(line.contains("run.mcap: it was deleted") && !line.contains("recover"), "{line}");
+}
+
+/// The recording goes on in a folder that was moved away; what comes after it finds no place.
+#[test]
+fn a_run_whose_folder_was_moved_keeps_its_recording_and_its_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, temporary) = (folder.path().join("out"), tempfile::tempdir().unwrap());
+    let run = under_way(&out, temporary.path());
+    let moved = folder.path().join("moved");
+    std::fs::rename(&out, &moved).unwrap();
+    let stop = Command::new("kill").args(["-TERM", &run.id().to_string()]).status().unwrap();
+    assert!(stop.success());
+    let line = summary_elsewhere(run, temporary.path());
+    assert!(line.contains("out/summary.json"), "{line}");
+    let whole = server(&["recover", text(&moved.join("run.mcap"))]);
+    assert!(String::from_utf8(whole.stdout).unwrap().contains("the file was whole"));
 }
 
 #[test]

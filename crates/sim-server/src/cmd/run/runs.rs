@@ -2,6 +2,8 @@
 //! its summary.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -280,6 +282,18 @@ fn in_own_thread(job: Job) -> Result<Ended, Failure> {
     thread.join().map_err(|_| Failure::Work("the world's thread panicked".to_owned()))
 }
 
+/// Where a summary goes that its folder does not take: the folder for temporary files.
+fn keep_elsewhere(json: &str) -> Option<PathBuf> {
+    let name = format!("sim-server-summary-{}.json", run_id(unix_time()));
+    let path = std::env::temp_dir().join(name);
+    let mut file = File::create_new(&path).ok()?;
+    if file.write_all(json.as_bytes()).is_err() {
+        let _ = std::fs::remove_file(&path);
+        return None;
+    }
+    Some(path)
+}
+
 /// Closes the recording and writes the summary, also of a run that failed.
 fn finish(
     ended: Ended,
@@ -302,10 +316,15 @@ fn finish(
         out.keep();
     }
     let summary_written = out.write("summary.json", &json);
-    recorded.map_err(Failure::of_torn)?;
-    summary_written?;
+    let elsewhere = summary_written.as_ref().err().and_then(|_| keep_elsewhere(&json));
+    if let Err(failure) = recorded.map_err(Failure::of_torn).and(summary_written) {
+        return Err(match elsewhere {
+            Some(file) => failure.under_way().hint(&format!("summary: {}", file.display())),
+            None => failure.under_way(),
+        });
+    }
     let text = ended.world.traffic().manifest().to_toml().map_err(Failure::work)?;
-    out.write("traffic.manifest.toml", text)?;
+    out.write("traffic.manifest.toml", text).map_err(Failure::under_way)?;
     if let Some(why) = ended.world.traffic().failure() {
         output::note(&format!("traffic: {why}; the native engine went on"));
     }
