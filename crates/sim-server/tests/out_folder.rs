@@ -140,15 +140,19 @@ fn under_way(out: &Path, temporary: &Path) -> Child {
     let run = ["run", "flat", "--headless", "--pace", "20", "--duration", "1200", "--out"];
     let mut command = program();
     command.args(run).arg(out).env("TMPDIR", temporary).stderr(Stdio::piped());
-    let child = command.spawn().unwrap();
+    let mut child = command.spawn().unwrap();
     let recording = out.join("run.mcap");
-    for _ in 0..1000 {
-        if recording.metadata().is_ok_and(|m| m.len() > 100_000) {
-            return child;
-        }
+    let is_recorded = || recording.metadata().is_ok_and(|m| m.len() > 100_000);
+    let began = (0..1000).any(|_| {
         std::thread::sleep(Duration::from_millis(20));
+        is_recorded()
+    });
+    if !began {
+        child.kill().unwrap();
+        child.wait().unwrap();
     }
-    panic!("nothing was recorded");
+    assert!(began, "nothing was recorded");
+    child
 }
 
 /// The line of a run that could not go on or not be written: exit code 1, its summary elsewhere.
