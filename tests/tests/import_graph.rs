@@ -32,9 +32,10 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
 }
 
 /// Third-party crates that only one room may know.
-const ONLY: [(&str, &[&str]); 7] = [
+const ONLY: [(&str, &[&str]); 8] = [
     ("tokio", &["sim-server"]),
     ("axum", &["sim-server"]),
+    ("foxglove", &["sim-server"]),
     ("mcap", &["recording"]),
     ("ros2-client", &["ros2"]),
     ("pyo3", &["tractrix-python"]),

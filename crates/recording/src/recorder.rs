@@ -30,9 +30,9 @@ pub struct RunHeader {
     pub listener: Option<Listener>,
 }
 
-/// Hears every message of [`messages`](crate::messages) with the bytes that the file gets, in the
-/// writer's thread: a network's sink, which must not block.
-pub type Listener = Box<dyn FnMut(&TopicMessage) + Send>;
+/// Hears every message of [`messages`](crate::messages) with its time and the bytes that the file
+/// gets, in the writer's thread: a network's sink, which must not block.
+pub type Listener = Box<dyn FnMut(Time, &TopicMessage) + Send>;
 
 /// What a recording says about the bus that the truck is driven over.
 pub struct BusHeader {
@@ -401,20 +401,22 @@ mod tests {
     fn a_listener_hears_every_message_with_the_bytes_of_the_file() {
         let (heard, hears) = std::sync::mpsc::channel();
         let disk = Hanging::default();
-        let listener = move |message: &TopicMessage| heard.send(message.clone()).unwrap();
+        let listener =
+            move |now, message: &TopicMessage| heard.send((now, message.clone())).unwrap();
         let mut recording = recording(&disk, 60.0, Some(Box::new(listener)));
         drive(&mut recording, 0..100);
         recording.finish("{}").unwrap();
-        let heard: Vec<TopicMessage> = hears.into_iter().collect();
-        assert_eq!(heard[0].topic.name, "/tf_static");
-        assert_eq!(heard.iter().filter(|m| m.topic.name == "/clock").count(), 100);
-        assert!(heard.iter().all(|m| !m.topic.name.starts_with("/stack/")));
+        let heard: Vec<(Time, TopicMessage)> = hears.into_iter().collect();
+        assert_eq!(heard[0].1.topic.name, "/tf_static");
+        assert_eq!(heard.iter().filter(|(_, m)| m.topic.name == "/clock").count(), 100);
+        assert!(heard.iter().all(|(_, m)| !m.topic.name.starts_with("/stack/")));
         let file = disk.when_it_goes(|file| file.get_ref().clone());
         let mut heard = heard.iter();
         for message in mcap::MessageStream::new(&file).unwrap() {
             let message = message.unwrap();
             if !message.channel.topic.starts_with("/stack/") {
-                let live = heard.next().unwrap();
+                let (now, live) = heard.next().unwrap();
+                assert_eq!(now.0.unsigned_abs(), message.log_time);
                 assert_eq!(live.topic.name, message.channel.topic);
                 assert_eq!(live.cdr, *message.data);
             }

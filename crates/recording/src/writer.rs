@@ -71,7 +71,7 @@ impl Writer {
         let [frames, others @ ..] = &TOPICS;
         let mut telling = |message: &TopicMessage| {
             if let Some(listener) = &mut listener {
-                listener(message);
+                listener(Time::ZERO, message);
             }
         };
         file.open(frames)?;
@@ -151,7 +151,7 @@ impl Writer {
                     for message in messages(&tick, &self.scenery, due)? {
                         self.file.write(now, &message)?;
                         if let Some(listener) = &mut self.listener {
-                            listener(&message);
+                            listener(now, &message);
                         }
                     }
                     if now >= self.flush_due {

@@ -71,7 +71,7 @@ impl Feed {
     pub(crate) fn listener(&self) -> Listener {
         let feed = self.clone();
         #[expect(clippy::disallowed_methods, reason = "rates are limited in wall time")]
-        Box::new(move |message| feed.say(message, Instant::now()))
+        Box::new(move |_, message| feed.say(message, Instant::now()))
     }
 
     /// Messages that the network was too slow for.

@@ -91,9 +91,10 @@ impl Failure {
         Self::Input(format!("{}: {error}", path.display()))
     }
 
-    /// Something that the contract names but this version does not do.
-    pub(crate) fn unsupported(what: &str) -> Self {
-        Self::Input(format!("{what} is not supported in this version"))
+    /// Something that the program was built without.
+    pub(crate) fn not_built(feature: &str) -> Self {
+        let build = format!("cargo build --release -p sim-server --features {feature}");
+        Self::Input(format!("--{feature}: this program was built without it ({build})"))
     }
 
     /// The process exit code.

@@ -1,39 +1,86 @@
 //! Who hears a session's telemetry beside its recording, over the network.
 
 use recording::Listener;
+use tokio::runtime;
 
 use crate::failure::Failure;
 use crate::session::Handle;
 
 /// The networks that a session is shown on.
-#[derive(Default)]
 pub(crate) struct Listeners {
     #[cfg(feature = "ros2")]
     ros2: Option<ros2::Node>,
+    #[cfg(feature = "foxglove")]
+    foxglove: Option<crate::foxglove_live::Live>,
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wanted {
+    /// A node of a ROS 2 domain.
+    pub(crate) ros2: bool,
+    /// A server of Foxglove's protocol, on this port.
+    pub(crate) foxglove: Option<u16>,
+}
+
+impl Wanted {
+    /// Refuses what the program was built without.
+    ///
+    /// # Errors
+    /// [`Failure::Input`] says how to build it.
+    pub(crate) fn refuse_unbuilt(self) -> Result<(), Failure> {
+        let ros2 = self.ros2 && cfg!(not(feature = "ros2"));
+        let foxglove = self.foxglove.is_some() && cfg!(not(feature = "foxglove"));
+        match (ros2, foxglove) {
+            (true, _) => Err(Failure::not_built("ros2")),
+            (_, true) => Err(Failure::not_built("foxglove")),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl Listeners {
-    /// Joins what was asked for.
+    /// Joins what was asked for, of what the program was built with.
     ///
     /// # Errors
-    /// As [`crate::ros2_node::start`].
-    #[cfg(feature = "ros2")]
-    pub(crate) fn start(ros2: bool, session: &Handle) -> Result<Self, Failure> {
-        let ros2 = ros2.then(|| crate::ros2_node::start(session)).transpose()?;
-        Ok(Self { ros2 })
+    /// [`Failure::Input`]: a ROS domain with a clock already, a port that is taken.
+    #[cfg_attr(
+        not(all(feature = "ros2", feature = "foxglove")),
+        expect(unused_variables, reason = "each feature uses its own")
+    )]
+    pub(crate) fn start(
+        wanted: Wanted,
+        session: &Handle,
+        runtime: &runtime::Handle,
+    ) -> Result<Self, Failure> {
+        Ok(Self {
+            #[cfg(feature = "ros2")]
+            ros2: wanted.ros2.then(|| crate::ros2_node::start(session)).transpose()?,
+            #[cfg(feature = "foxglove")]
+            foxglove: wanted
+                .foxglove
+                .map(|port| crate::foxglove_live::Live::start(port, session, runtime))
+                .transpose()?,
+        })
     }
 
-    /// This program was built without any.
-    #[cfg(not(feature = "ros2"))]
-    pub(crate) fn start(_: bool, _: &Handle) -> Result<Self, Failure> {
-        Ok(Self::default())
-    }
-
-    /// What a recording tells them.
+    /// What the recording of the next run tells them.
     pub(crate) fn listener(&self) -> Option<Listener> {
-        #[cfg(feature = "ros2")]
-        return self.ros2.as_ref().map(ros2::Node::listener);
-        #[cfg(not(feature = "ros2"))]
-        None
+        let asked_for: Vec<Option<Listener>> = Vec::from([
+            #[cfg(feature = "ros2")]
+            self.ros2.as_ref().map(ros2::Node::listener),
+            #[cfg(feature = "foxglove")]
+            self.foxglove.as_ref().map(crate::foxglove_live::Live::listener),
+        ]);
+        let mut all: Vec<Listener> = asked_for.into_iter().flatten().collect();
+        match all.len() {
+            0 => None,
+            1 => all.pop(),
+            _ => Some(Box::new(move |now, message| {
+                for listener in &mut all {
+                    listener(now, message);
+                }
+            })),
+        }
     }
 }

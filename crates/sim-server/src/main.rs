@@ -8,6 +8,8 @@ mod cli;
 mod cmd;
 mod dashboard;
 mod failure;
+#[cfg(feature = "foxglove")]
+mod foxglove_live;
 mod listeners;
 mod out_folder;
 mod output;

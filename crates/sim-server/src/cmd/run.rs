@@ -88,9 +88,11 @@ pub(crate) struct Args {
     /// this machine alone unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET. Nobody is authenticated.
     #[arg(long)]
     ros2: bool,
-    /// Foxglove WebSocket; not supported yet.
-    #[arg(long)]
-    foxglove: bool,
+    /// Shows the run to Foxglove and Lichtblick, and takes commands from them, on this port of
+    /// 127.0.0.1 (0: a free one). Nobody is authenticated, and any page in a browser on this
+    /// machine can reach it. Needs a program that is built with `--features foxglove`.
+    #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
+    foxglove: Option<u16>,
 }
 
 /// A way to the truck.

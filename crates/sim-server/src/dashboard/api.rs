@@ -98,7 +98,11 @@ pub(super) async fn control(
 /// A million ticks at the speed of a slow machine.
 const LONGEST_WAIT: Duration = Duration::from_secs(600);
 
-async fn carry_out(handle: Handle, wish: Wish) -> Result<Acted, Refused> {
+/// Carries out what was asked for.
+///
+/// # Errors
+/// [`Refused`].
+pub(crate) async fn carry_out(handle: Handle, wish: Wish) -> Result<Acted, Refused> {
     let command = match wish {
         Wish::Command(command) => command,
         Wish::Reset { seed } => restart(handle.clone(), seed, None).await?,

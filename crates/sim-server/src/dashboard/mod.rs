@@ -24,6 +24,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio::sync::{Semaphore, watch};
 
+#[cfg(feature = "foxglove")]
+pub(crate) use api::carry_out;
 pub(crate) use publisher::Publisher;
 pub(crate) use server::{Dashboard, bind};
 

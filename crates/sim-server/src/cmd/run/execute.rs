@@ -33,24 +33,24 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     let (handle, asked) = session::channel(scenario, seed, outside_bus);
     let shared = listener.is_some().then(|| Shared::new(runs::setting(&world), handle.clone()));
     let stop = Arc::new(AtomicBool::new(false));
-    let listeners = Listeners::start(args.ros2, &handle)?;
-    let runs = Runs { args, listeners, shared: shared.clone(), handle, stop: Arc::clone(&stop) };
-    let first = Begin { world, seed, state: State::Playing, out, waiting: None };
-    let first = runs.prepare(first, asked)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()
         .map_err(Failure::work)?;
+    let ending = Arc::new(Notify::new());
+    runtime.spawn(raise_at_signal(Arc::clone(&stop), Arc::clone(&ending)));
+    let listeners = Listeners::start(super::options::networks(args), &handle, runtime.handle())?;
+    let runs = Runs { args, listeners, shared: shared.clone(), handle, stop };
+    let first = Begin { world, seed, state: State::Playing, out, waiting: None };
+    let first = runs.prepare(first, asked)?;
     if let (Some(listener), Some(shared)) = (listener, shared) {
         let address = listener.local_addr().map_err(Failure::work)?;
         output::note(&format!("dashboard: http://{address}  (Ctrl-C ends the run)"));
         runtime.spawn(Dashboard::new(listener, shared).serve());
     }
-    let ending = Arc::new(Notify::new());
-    runtime.spawn(raise_at_signal(stop, Arc::clone(&ending)));
     let ended = runs.drive_all(first, &runtime, &ending);
-    if !args.headless {
+    if !args.headless || args.foxglove.is_some() {
         runtime.block_on(async { tokio::time::sleep(LAST_FRAME_TIME).await });
     }
     runtime.shutdown_background();

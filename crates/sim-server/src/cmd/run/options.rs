@@ -9,13 +9,14 @@ use sim::{Overrides, Scenario, World};
 
 use super::Args;
 use crate::failure::Failure;
+use crate::listeners::Wanted;
 
 /// The scenario with the command line's changes.
 ///
 /// # Errors
 /// [`Failure::Input`] names the file and key, or the option that cannot be used.
 pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
-    refuse_unsupported(args)?;
+    networks(args).refuse_unbuilt()?;
     let mut scenario = Scenario::named(&args.scenario).map_err(Failure::input)?;
     let changes = Overrides {
         road: args.road.as_deref(),
@@ -34,15 +35,9 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
     Ok(scenario)
 }
 
-/// What the contract names and this version does not do.
-fn refuse_unsupported(args: &Args) -> Result<(), Failure> {
-    let ros2 = args.ros2 && cfg!(not(feature = "ros2"));
-    for (asked, flag) in [(ros2, "--ros2"), (args.foxglove, "--foxglove")] {
-        if asked {
-            return Err(Failure::unsupported(flag));
-        }
-    }
-    Ok(())
+/// The networks that the run is to be shown on.
+pub(super) const fn networks(args: &Args) -> Wanted {
+    Wanted { ros2: args.ros2, foxglove: args.foxglove }
 }
 
 /// Reaches the truck as `--vehicle` says: directly, over a bus in memory, or over a bus outside

@@ -1,0 +1,216 @@
+"""`--foxglove`, seen by a viewer: the recording's bytes, time, services, commands, refusals.
+
+`SIM_SERVER` names a program that was built with `--features foxglove`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from viewer import Said, connected
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+SERVER = os.environ["SIM_SERVER"]
+
+
+class Run:
+    """A run under way, where its viewers connect, and what it says on stderr."""
+
+    def __init__(self, process: subprocess.Popen[str], url: str, folder: Path) -> None:
+        self.process = process
+        self.url = url
+        self.folder = folder
+
+    def end(self) -> str:
+        """Ends it as SIGTERM does; the rest of what it said."""
+        self.process.send_signal(signal.SIGTERM)
+        _, said = self.process.communicate(timeout=60)
+        assert self.process.returncode == 0, said
+        return said
+
+
+@contextmanager
+def running(folder: Path, *options: str) -> Iterator[Run]:
+    """A run that is shown to viewers."""
+    command: list[str | Path] = [SERVER, "run", "--headless", "--foxglove", "0"]
+    command += ["--out", folder, *options]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            assert process.stderr is not None
+            line = process.stderr.readline()
+            found = re.search(r"ws://127\.0\.0\.1:\d+", line)
+            assert found is not None, line
+            yield Run(process, found.group(), folder)
+        finally:
+            process.kill()
+
+
+def recorded(file: Path) -> tuple[dict[str, tuple[str, str, bytes]], list[Said]]:
+    """Topics with type, encoding and definition, and messages of a recording."""
+    with file.open("rb") as source:
+        reader = make_reader(source)
+        summary = reader.get_summary()
+        assert summary is not None
+        topics = {}
+        for channel in summary.channels.values():
+            schema = summary.schemas[channel.schema_id]
+            topics[channel.topic] = (schema.name, schema.encoding, schema.data)
+            assert channel.message_encoding == "cdr"
+        messages = [
+            Said(channel.topic, message.log_time, message.data)
+            for _, channel, message in reader.iter_messages()
+        ]
+    return topics, messages
+
+
+def test_a_viewer_gets_the_recordings_channels_schemas_and_bytes(
+    tmp_path: Path,
+) -> None:
+    out = tmp_path / "out"
+    options = ("--seed", "7", "--pace", "1")
+    with running(out, *options) as run, connected(run.url) as viewer:
+        assert viewer.call("/pause")["state"] == "paused"
+        viewer.subscribe_all()
+        assert viewer.call("/pace", pace=20)["state"] == "paused"
+        before = viewer.call("/step", ticks=1)
+        after = viewer.call("/step", ticks=300)
+        assert after["tick"] == before["tick"] + 300
+        viewer.drain()
+        run.end()
+        seen, channels, times_ns = viewer.messages, viewer.channels, viewer.times_ns
+    topics, messages = recorded(out / "run.mcap")
+    ours = {topic for topic in topics if not topic.startswith("/stack/")}
+    assert set(channels) == ours and len(ours) > 10
+    for topic, channel in channels.items():
+        name, encoding, definition = topics[topic]
+        assert (channel["encoding"], channel["schemaName"]) == ("cdr", name)
+        assert channel["schemaEncoding"] == encoding == "ros2msg"
+        assert channel["schema"].encode() == definition, topic
+    assert len(seen) >= 1000
+    stepped_ns = {said.time_ns for said in seen if said.topic == "/clock"}
+    expected = [
+        said
+        for said in messages
+        if said.topic in ours
+        and (said.time_ns in stepped_ns or said.topic in ("/tf_static", "/road/lanes"))
+    ]
+    for topic in ours:
+        got = [(said.time_ns, said.data) for said in seen if said.topic == topic]
+        wanted = [(said.time_ns, said.data) for said in expected if said.topic == topic]
+        assert got == wanted, topic
+    assert len(stepped_ns) >= 301
+    assert times_ns == sorted(times_ns) and times_ns[-1] <= max(stepped_ns)
+
+
+def test_services_are_the_commands_of_the_api(tmp_path: Path) -> None:
+    with running(tmp_path / "out", "--seed", "7") as run:
+        with connected(run.url) as viewer:
+            assert {"/play", "/pause", "/step", "/reset"} <= set(viewer.services)
+            refused = viewer.call("/step", ticks=5)
+            assert "pause it first" in refused["failure"]
+            assert viewer.call("/pause")["state"] == "paused"
+            assert "ticks = 0" in viewer.call("/step", ticks=0)["failure"]
+            assert "extra" in viewer.call("/play", extra=1)["failure"]
+            sessions = len(viewer.info)
+            viewer.subscribe_all()
+            assert viewer.call("/reset", seed=8) == {
+                "schema": 1,
+                "tick": 0,
+                "time_s": 0.0,
+                "state": "paused",
+            }
+            assert viewer.call("/step", ticks=10)["tick"] == 10
+            # Viewers forget the run before when the session has another id
+            assert len(viewer.info) == sessions + 1
+            assert viewer.info[-1]["sessionId"] != viewer.info[0]["sessionId"]
+            viewer.until(lambda: any(s.topic == "/clock" for s in viewer.messages))
+            first = next(s for s in viewer.messages if s.topic == "/clock")
+            assert first.time_ns == 0
+            assert viewer.call("/play")["state"] == "playing"
+            assert viewer.call("/stop")["state"] == "stopped"
+        run.end()
+    summary = json.loads((tmp_path / "out" / "run-2" / "summary.json").read_text())
+    assert summary["seed"] == 8
+
+
+def test_a_published_command_acts_and_a_wrong_one_is_refused_with_words(
+    tmp_path: Path,
+) -> None:
+    with running(tmp_path / "out", "--seed", "7") as run:
+        with connected(run.url) as viewer:
+            viewer.call("/pause")
+            viewer.call("/step", ticks=20)
+            viewer.publish(1, "/command/set_speed", 15.0)
+            viewer.publish(2, "/command/set_speed", 99)
+            viewer.until(lambda: bool(viewer.statuses))
+            assert "speed_m_s = 99: expected a speed" in viewer.statuses[-1]
+            viewer.publish(3, "/command/fly", True)
+            viewer.until(lambda: len(viewer.statuses) >= 2)
+            assert "/command/fly commands nothing" in viewer.statuses[1]
+            viewer.publish(4, "/command/lane_change", "left")
+            viewer.until(lambda: "--decider external" in viewer.statuses[-1])
+            viewer.call("/step", ticks=20)
+        run.end()
+    with (tmp_path / "out" / "run.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        found = reader.iter_decoded_messages(topics=["/stack/input"])
+        speeds = [message.decoded_message.set_speed_m_s for message in found]
+    assert speeds[-1] == 15.0 and speeds[0] != 15.0
+
+
+def test_a_viewer_of_the_old_protocol_is_refused_in_the_log(tmp_path: Path) -> None:
+    with running(tmp_path / "out") as run:
+        with pytest.raises(InvalidStatus):
+            old = [Subprotocol("foxglove.websocket.v1")]
+            with connect(run.url, subprotocols=old):
+                pass
+        said = run.end()
+    assert "a viewer must offer foxglove.sdk.v1" in said
+
+
+def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
+    with running(tmp_path / "out") as run:
+        port = run.url.rsplit(":", 1)[1]
+        again = subprocess.run(
+            [SERVER, "run", "--headless", "--foxglove", port, "--out", tmp_path / "b"],
+            check=False,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+        assert again.returncode == 2 and len(again.stderr.splitlines()) == 1
+        assert f"port {port} on 127.0.0.1 is in use" in again.stderr
+        run.end()
+
+
+def test_viewers_change_no_bit_of_the_run(tmp_path: Path) -> None:
+    options = ("--seed", "7", "--duration", "8")
+    alone = subprocess.run(
+        [SERVER, "run", "--headless", "--json", *options, "--out", tmp_path / "alone"],
+        check=True,
+        capture_output=True,
+        timeout=60,
+    )
+    with (
+        running(tmp_path / "seen", "--json", "--pace", "4", *options) as run,
+        connected(run.url) as viewer,
+    ):
+        # It takes nothing of what it wants
+        viewer.subscribe_all()
+        out, _ = run.process.communicate(timeout=60)
+    hashes = {json.loads(text)["state_hash"] for text in (alone.stdout, out)}
+    assert len(hashes) == 1
