@@ -21,6 +21,7 @@ from tractrix._native import Snapshot
 from tractrix._plan import plan
 from tractrix._policy import Policy
 from tractrix._recording import read_run
+from tractrix._rerun import rerun_blueprint
 from tractrix._scenario import scenario, scenarios
 from tractrix._state import SCENE_DTYPE, Decision, Ego
 from tractrix._truck_model import TruckModel
@@ -48,6 +49,7 @@ __all__ = [
     "drives",
     "plan",
     "read_run",
+    "rerun_blueprint",
     "scenario",
     "scenarios",
 ]
