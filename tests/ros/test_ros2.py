@@ -15,16 +15,19 @@ from typing import Any
 
 import pytest
 import rclpy
+from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
 from rcl_interfaces.msg import Log
+from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, NavSatFix
+from simulation_interfaces.action import SimulateSteps
 from simulation_interfaces.msg import (
     EntityCategory,
     EntityFilters,
@@ -110,14 +113,17 @@ class Peer:
             assert time.monotonic() < end, f"{what}: not within {within_s} s"
             self.executor.spin_once(timeout_sec=0.05)
 
+    def wait(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.executor.spin_once(timeout_sec=0.05)
+
     def call(self, kind: Any, name: str, **fields: Any) -> Any:
         if name not in self.services:
             self.services[name] = self.node.create_client(kind, name)
             self.until(self.services[name].service_is_ready, name, DISCOVERY_S)
             # A client knows the server before the server knows it: an answer would be lost
-            end = time.monotonic() + 1.0
-            while time.monotonic() < end:
-                self.executor.spin_once(timeout_sec=0.05)
+            self.wait(1.0)
         client = self.services[name]
         future = client.call_async(kind.Request(**fields))
         self.until(future.done, name)
@@ -137,9 +143,7 @@ class Peer:
         """The clock, once nothing more comes."""
         while True:
             before = len(self.heard["/clock"])
-            end = time.monotonic() + 0.5
-            while time.monotonic() < end:
-                self.executor.spin_once(timeout_sec=0.05)
+            self.wait(0.5)
             if len(self.heard["/clock"]) == before:
                 return self.clock_ns()
 
@@ -232,7 +236,21 @@ def test_another_nodes_clock_follows_the_run(peer: Peer) -> None:
 
 def test_only_what_works_is_a_feature(peer: Peer) -> None:
     features = peer.call(GetSimulatorFeatures, "/get_simulator_features").features
-    assert sorted(features.features) == [8, 10, 20, 24, 25, 26, 31, 32, 40, 41, 44, 45]
+    assert sorted(features.features) == [
+        8,
+        10,
+        20,
+        24,
+        25,
+        26,
+        31,
+        32,
+        33,
+        40,
+        41,
+        44,
+        45,
+    ]
 
 
 def test_pause_step_and_play(peer: Peer) -> None:
@@ -253,6 +271,58 @@ def test_pause_step_and_play(peer: Peer) -> None:
     assert peer.set_state(77).result == SetSimulationState.Response.INCORRECT_TRANSITION
     assert peer.set_state(SimulationState.STATE_PLAYING).result == Result.RESULT_OK
     peer.until(lambda: peer.clock_ns() > before + 500_000_000, "it goes on")
+
+
+def test_steps_are_an_action_with_feedback_that_can_be_cancelled(peer: Peer) -> None:
+    client = ActionClient(peer.node, SimulateSteps, "/simulate_steps")
+    peer.until(client.server_is_ready, "the action", DISCOVERY_S)
+    peer.wait(1.0)
+    progress: list[Any] = []
+
+    def send(steps: int) -> Any:
+        progress.clear()
+        future = client.send_goal_async(
+            SimulateSteps.Goal(steps=steps),
+            feedback_callback=lambda said: progress.append(said.feedback),
+        )
+        peer.until(future.done, "the goal's answer")
+        assert future.result().accepted
+        return future.result()
+
+    def ended(goal: Any) -> tuple[int, Any]:
+        future = goal.get_result_async()
+        peer.until(future.done, "the result")
+        return future.result().status, future.result().result.result
+
+    status, result = ended(send(10))
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.result == Result.RESULT_OPERATION_FAILED
+    assert "not paused" in result.error_message
+    peer.set_state(SimulationState.STATE_PAUSED)
+    before_ns = peer.settled_clock_ns()
+    status, result = ended(send(35))
+    assert (status, result.result) == (GoalStatus.STATUS_SUCCEEDED, Result.RESULT_OK)
+    assert peer.settled_clock_ns() == before_ns + 350_000_000
+    seen = [(p.completed_steps, p.remaining_steps) for p in progress]
+    assert seen == [(10, 25), (20, 15), (30, 5), (35, 0)]
+    # A thousand seconds, of which the first are driven
+    goal = send(100_000)
+    peer.until(lambda: len(progress) >= 3, "feedback")
+    cancel = goal.cancel_goal_async()
+    peer.until(cancel.done, "the cancellation")
+    assert len(cancel.result().goals_canceling) == 1
+    status, result = ended(goal)
+    assert status == GoalStatus.STATUS_CANCELED and "cancelled" in result.error_message
+    driven_ns = peer.settled_clock_ns() - before_ns - 350_000_000
+    assert driven_ns == progress[-1].completed_steps * 10_000_000 < 10**12
+    # A result that nobody fetches does not keep the next goal waiting
+    send(10)
+    peer.until(lambda: bool(progress), "feedback")
+    peer.wait(0.2)
+    assert ended(send(0))[0] == GoalStatus.STATUS_ABORTED
+    assert ended(send(10))[0] == GoalStatus.STATUS_SUCCEEDED
+    client.destroy()
+    assert peer.set_state(SimulationState.STATE_PLAYING).result == Result.RESULT_OK
 
 
 def test_entities_are_those_of_the_topics(peer: Peer) -> None:

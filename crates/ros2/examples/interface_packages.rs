@@ -12,7 +12,12 @@ fn main() -> std::io::Result<()> {
     };
     let folder = Path::new(&folder);
     write(folder, "tf2_msgs", &["geometry_msgs"], TF2_MSGS)?;
-    write(folder, "simulation_interfaces", &["std_msgs", "geometry_msgs"], SIMULATION_INTERFACES)
+    write(
+        folder,
+        "simulation_interfaces",
+        &["std_msgs", "geometry_msgs", "action_msgs"],
+        SIMULATION_INTERFACES,
+    )
 }
 
 /// A package as `ament_cmake` builds it.

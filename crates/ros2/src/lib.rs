@@ -18,6 +18,7 @@ mod network;
 mod node;
 mod services;
 mod simulator;
+mod steps;
 
 pub use error::Ros2Error;
 pub use interfaces::definitions;

@@ -11,14 +11,15 @@ use futures::channel::oneshot;
 use futures::future::{LocalBoxFuture, join_all, select};
 use futures::{FutureExt, StreamExt};
 use recording::{Listener, TOPICS, Topic};
+use ros2_client::action::ActionServerQosPolicies;
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::dds::rustdds::{self, DomainParticipant};
 use ros2_client::log::LogLevel;
 use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::rosout::RosoutRaw;
 use ros2_client::{
-    Context, Message, MessageTypeName, Name, NodeLoggingHandle, NodeName, NodeOptions, Publisher,
-    QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
+    ActionTypeName, Context, Message, MessageTypeName, Name, NodeLoggingHandle, NodeName,
+    NodeOptions, Publisher, QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
 };
 use serde::de::DeserializeOwned;
 
@@ -29,6 +30,7 @@ use crate::interfaces::command::{Asks, Float64, Text};
 use crate::network::Network;
 use crate::services;
 use crate::simulator::{Refused, Simulator};
+use crate::steps;
 
 /// Other programs of the domain are known after so long.
 const DISCOVERY: Duration = Duration::from_millis(1200);
@@ -195,6 +197,7 @@ impl Setup {
             self.service("set_simulation_state", "SetSimulationState", s, services::set_state)?,
             self.service("reset_simulation", "ResetSimulation", s, services::reset)?,
             self.service("step_simulation", "StepSimulation", s, services::step)?,
+            self.simulate_steps(s)?,
             self.service("get_entities", "GetEntities", s, services::entities)?,
             self.service("get_entities_states", "GetEntitiesStates", s, services::entities_states)?,
             self.service("get_entity_state", "GetEntityState", s, services::entity_state)?,
@@ -221,6 +224,31 @@ impl Setup {
         Ok(Box::new(move || {
             async move { obey(&subscription, &*simulator, name, &log).await }.boxed_local()
         }))
+    }
+
+    /// The action `SimulateSteps`.
+    fn simulate_steps(&mut self, simulator: &Arc<dyn Simulator>) -> Result<Loop, Ros2Error> {
+        let what = "simulate_steps";
+        let reliable = || QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
+        let latched = reliable()
+            .durability(Durability::TransientLocal)
+            .history(History::KeepLast { depth: 1 });
+        let qos = ActionServerQosPolicies {
+            goal_service: reliable(),
+            result_service: reliable(),
+            cancel_service: reliable(),
+            feedback_publisher: reliable().reliability_reliable(WhenFull::Fail),
+            status_publisher: latched.reliability_reliable(WhenFull::Fail),
+        };
+        let name = Name::new("/", what).map_err(|e| self.network.failure(what, e))?;
+        let kind = ActionTypeName::new("simulation_interfaces", "SimulateSteps");
+        let server = self
+            .node
+            .create_action_server(ServiceMapping::Enhanced, &name, &kind, qos)
+            .map_err(|e| self.network.failure(what, e))?;
+        let server = steps::Server::new(server);
+        let simulator = Arc::clone(simulator);
+        Ok(Box::new(move || async move { steps::serve(&server, &*simulator).await }.boxed_local()))
     }
 
     fn service<Req, Resp>(

@@ -12,11 +12,11 @@ use crate::interfaces::simulation::{
 use crate::simulator::{Entities, Entity, Refused, Request, Simulator, State, World, WorldSource};
 
 /// Steps of one request, at most.
-const MAX_STEPS: u64 = 1_000_000;
+pub(crate) const MAX_STEPS: u64 = 1_000_000;
 /// What works, as numbered in `msg/SimulatorFeatures`: entity categories and states, reset, state
-/// getting, setting and pause, single and multiple steps, worlds by name and text, the current one,
+/// getting, setting and pause, single and multiple steps, their action, worlds by name and text, the current one,
 /// the available ones.
-const FEATURES: [u16; 12] = [8, 10, 20, 24, 25, 26, 31, 32, 40, 41, 44, 45];
+const FEATURES: [u16; 13] = [8, 10, 20, 24, 25, 26, 31, 32, 33, 40, 41, 44, 45];
 const CATEGORY_ROBOT: u8 = 1;
 const CATEGORY_DYNAMIC_OBJECT: u8 = 4;
 /// Scopes of a reset that are all there is to reset: time and state, with or without what was

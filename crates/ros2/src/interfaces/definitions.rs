@@ -47,7 +47,7 @@ pub const SIMULATION_INTERFACES: &[Definition] = &[
         "uint8 ENTITY_CATEGORIES=8\nuint8 ENTITY_STATE_GETTING=10\nuint8 SIMULATION_RESET=20\n\
          uint8 SIMULATION_STATE_GETTING=24\nuint8 SIMULATION_STATE_SETTING=25\n\
          uint8 SIMULATION_STATE_PAUSE=26\nuint8 STEP_SIMULATION_SINGLE=31\n\
-         uint8 STEP_SIMULATION_MULTIPLE=32\nuint8 WORLD_LOADING=40\n\
+         uint8 STEP_SIMULATION_MULTIPLE=32\nuint8 STEP_SIMULATION_ACTION=33\nuint8 WORLD_LOADING=40\n\
          uint8 WORLD_RESOURCE_STRING=41\nuint8 WORLD_INFO_GETTING=44\n\
          uint8 AVAILABLE_WORLDS=45\nuint16[] features\nstring[] spawn_formats\n\
          string custom_info\n",
@@ -70,6 +70,10 @@ pub const SIMULATION_INTERFACES: &[Definition] = &[
          uint8 SCOPE_ALL=255\nuint8 scope\n---\nResult result\n",
     ),
     ("srv/StepSimulation.srv", "uint64 steps 1\n---\nResult result\n"),
+    (
+        "action/SimulateSteps.action",
+        "uint64 steps\n---\nResult result\n---\nuint64 completed_steps\nuint64 remaining_steps\n",
+    ),
     ("srv/GetEntities.srv", "EntityFilters filters\n---\nResult result\nstring[] entities\n"),
     (
         "srv/GetEntitiesStates.srv",

@@ -85,7 +85,7 @@ message! {
     SetState { state: SimulationState, }
 }
 message! {
-    /// Response of the services that only say how it went.
+    /// Response of the services that only say how it went, result of `action/SimulateSteps`.
     Done { result: Outcome, }
 }
 message! {
@@ -93,8 +93,13 @@ message! {
     Reset { scope: u8, }
 }
 message! {
-    /// Request of `srv/StepSimulation`.
+    /// Request of `srv/StepSimulation`, goal of `action/SimulateSteps`.
     Step { steps: u64, }
+}
+impl Copy for Step {}
+message! {
+    /// Feedback of `action/SimulateSteps`.
+    Progress { completed_steps: u64, remaining_steps: u64, }
 }
 message! {
     /// Request of `srv/GetEntities` and `srv/GetEntitiesStates`.
