@@ -82,6 +82,68 @@ def test_a_run_in_lockstep_has_the_bits_of_a_world_in_this_process(
         assert summary["state_hash"] == world.summary()["state_hash"]
 
 
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tractrix.Client]:
+    runs = tmp_path_factory.mktemp("serve") / "runs"
+    words: list[str | Path] = ["serve", "--port", "0", "--sessions", "2", "--runs", runs]
+    with subprocess.Popen(
+        [program(), *words], stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        address = re.search(r"http://[0-9.:]+", process.stderr.readline())
+        assert address is not None
+        with tractrix.Client(address.group()) as client:
+            yield client
+        process.kill()
+
+
+def test_sessions_begin_end_and_leave_runs(
+    server: tractrix.Client, tmp_path: Path
+) -> None:
+    assert server.sessions() == []
+    assert "flat" in {scenario["name"] for scenario in server.scenarios()}
+    with pytest.raises(tractrix.Refused, match="nothing") as refused:
+        server.create("nothing")
+    assert refused.value.code == "unusable"
+    names = []
+    for seed in (7, 7):
+        session = server.create("medium-15", seed=seed, decider="external", pace="max")
+        session.pause()
+        assert session.step(500).tick == 500
+        names.append(session.info()["run"])
+        session.end()
+    assert server.sessions() == []
+    runs = [server.run(name) for name in names]
+    hashes = {run.info()["summary"]["state_hash"] for run in runs}
+    with tractrix.World("medium-15", seed=7, decider="external") as world:
+        world.step(500)
+        assert hashes == {world.summary()["state_hash"]}
+    compared = server.compare(*names)
+    assert (compared["ticks"], compared["ticks_different"]) == (500, 0)
+    assert len(runs[0].frames(1.0, 2.0)) == 5
+    runs[0].download(tmp_path / "run.mcap")
+    assert len(tractrix.read_run(tmp_path / "run.mcap")) == 500
+    assert {run.name for run in server.runs()} == set(names)
+    runs[0].remove()
+    with pytest.raises(tractrix.Refused) as refused:
+        server.run(names[0])
+    assert refused.value.code == "no_run"
+
+
+def test_a_trip_is_planned_as_a_job(server: tractrix.Client) -> None:
+    speeds = {"set_speed_m_s": 22.0, "speed_min_m_s": 20.0, "speed_max_m_s": 24.0}
+    job = server.plan(
+        truck="sinotruk", road="builtin:highway", mass_kg=40_000.0, **speeds
+    )
+    assert job.wait(120.0)["status"] == "done"
+    plan = job.json("plan.json")
+    assert plan["saving_frac"]["vs_set_speed"] > 0.02
+    job.cancel()
+    with pytest.raises(tractrix.Refused) as refused:
+        job.info()
+    assert refused.value.code == "no_job"
+
+
 def test_nobody_answers() -> None:
     with (
         tractrix.Client("http://127.0.0.1:9") as nobody,

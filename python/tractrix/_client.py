@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
 
@@ -37,7 +39,7 @@ class Acted:
 
 
 class Client:
-    """A `sim-server`, by its address.
+    """A `sim-server run` or `sim-server serve`, by its address.
 
     with tractrix.Client("http://127.0.0.1:8080") as client:
         session = client.session()
@@ -48,15 +50,23 @@ class Client:
     """
 
     def __init__(
-        self, url: str = "http://127.0.0.1:8080", *, timeout_s: float = 600.0
+        self,
+        url: str = "http://127.0.0.1:8080",
+        *,
+        timeout_s: float = 600.0,
+        token: str | None = None,
     ) -> None:
         """Asks nothing yet.
 
         Args:
             url: Address of the server, as it prints it.
             timeout_s: Longest wait for an answer. A step is answered when it is driven.
+            token: What is in the server's `--token-file`, if it has one.
         """
-        self._http = httpx.Client(base_url=url, timeout=timeout_s, trust_env=False)
+        headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        self._http = httpx.Client(
+            base_url=url, timeout=timeout_s, headers=headers, trust_env=False
+        )
 
     def __enter__(self) -> Self:
         return self
@@ -95,6 +105,81 @@ class Client:
         """
         return Session(self, self._get(f"/api/v1/sessions/{session_id}")["id"])
 
+    def create(
+        self,
+        scenario: str | None = None,
+        *,
+        toml: str | None = None,
+        seed: int | None = None,
+        state: Literal["stopped", "paused", "playing"] = "stopped",
+        pace: float | Literal["realtime", "max"] = "realtime",
+        **changes: Any,
+    ) -> Session:
+        """Begins a session, with a recording of its own.
+
+        Args:
+            scenario: Name of a built-in scenario; or
+            toml: the text of a scenario. It names what is built in, or files below the server's
+                `--assets`.
+            seed: Seed of everything that is drawn at random; otherwise the scenario's.
+            state: Standing still, or playing.
+            pace: Simulated seconds per second.
+            **changes: As the options of the command line: `road`, `truck`, `payload_kg`,
+                `duration_s`, `allow_off_road`, `traffic`, `mode`, `decider`, `speed_planner`.
+
+        Raises:
+            Refused: `too_many_sessions`, `unusable`, `outside`, `wrong_body`.
+        """
+        named = {"scenario": scenario, "toml": toml, "seed": seed}
+        wanted = {key: value for key, value in named.items() if value is not None}
+        body = {**wanted, "state": state, "pace": pace, **changes}
+        return Session(self, self._post("/api/v1/sessions", body)["id"])
+
+    def scenarios(self) -> list[dict[str, Any]]:
+        """Names and descriptions of the built-in scenarios."""
+        found: list[dict[str, Any]] = self._get("/api/v1/scenarios")["scenarios"]
+        return found
+
+    def runs(self) -> list[Run]:
+        """What sessions have left, the newest first."""
+        return [Run(self, r["name"]) for r in self._get("/api/v1/runs")["runs"]]
+
+    def run(self, name: str) -> Run:
+        """One run.
+
+        Raises:
+            Refused: There is no such run (`no_run`).
+        """
+        return Run(self, self._get(f"/api/v1/runs/{name}")["name"])
+
+    def compare(self, a: str, b: str) -> dict[str, Any]:
+        """Whether two runs are the same bit for bit, by their names: `ticks_different`,
+        `first_difference`, `other_scene_s`."""
+        return self._get(f"/api/v1/compare?a={a}&b={b}")
+
+    def plan(self, **trip: Any) -> Job:
+        """Plans a trip: `truck`, `road`, `mass_kg`, `set_speed_m_s`, `speed_min_m_s`,
+        `speed_max_m_s`, `trip_time_s`, `eco_roll`. A job with the files of `sim-server plan`."""
+        return Job(self, self._post("/api/v1/plan", trip)["id"])
+
+    def diagnose(self, **drives: Any) -> Job:
+        """Diagnoses drives: `truck`, `drives` (a folder among the server's assets) or `run`,
+        `baseline`, `hold_out`. A job with the files of `sim-server diagnose`."""
+        return Job(self, self._post("/api/v1/diagnose", drives)["id"])
+
+    def _delete(self, path: str) -> None:
+        answer = self._http.delete(path)
+        if not answer.is_success:
+            _answer(answer)
+
+    def _download(self, path: str, to: Path) -> None:
+        with self._http.stream("GET", path) as answer, to.open("xb") as file:
+            if not answer.is_success:
+                answer.read()
+                _answer(answer)
+            for part in answer.iter_bytes():
+                file.write(part)
+
     def _get(self, path: str) -> dict[str, Any]:
         return _answer(self._http.get(path))
 
@@ -116,6 +201,83 @@ def _answer(answer: httpx.Response) -> dict[str, Any]:
 def _refused(answer: httpx.Response, body: dict[str, Any]) -> Refused:
     code = str(body.get("type", "")).rpartition(":")[2]
     return Refused(answer.status_code, code, str(body.get("detail", "")))
+
+
+class Run:
+    """A run that a session has left, or is leaving."""
+
+    def __init__(self, client: Client, name: str) -> None:
+        self._client = client
+        self.name = name
+        """Name of the run."""
+        self._path = f"/api/v1/runs/{name}"
+
+    def info(self) -> dict[str, Any]:
+        """Size and time of the recording, whether it is still `recording`, the `summary`."""
+        return self._client._get(self._path)
+
+    def strip(self) -> dict[str, Any]:
+        """Columns over the distance."""
+        return self._client._get(f"{self._path}/strip")
+
+    def frames(self, from_s: float, to_s: float) -> list[dict[str, Any]]:
+        """Frames of a stretch of simulation time, four a second, 600 at most."""
+        path = f"{self._path}/frames?from_s={from_s}&to_s={to_s}"
+        found: list[dict[str, Any]] = self._client._get(path)["frames"]
+        return found
+
+    def download(self, to: str | Path) -> None:
+        """Writes the recording into a new file; of a run under way its finished part."""
+        self._client._download(f"{self._path}/recording", Path(to))
+
+    def report(self, to: str | Path) -> None:
+        """Writes the report, a page in one file, into a new file."""
+        self._client._download(f"{self._path}/report", Path(to))
+
+    def remove(self) -> None:
+        """Removes the run's files from the server."""
+        self._client._delete(self._path)
+
+
+class Job:
+    """A command that the server carries out."""
+
+    def __init__(self, client: Client, job_id: str) -> None:
+        self._client = client
+        self.id = job_id
+        """Name of the job."""
+        self._path = f"/api/v1/jobs/{job_id}"
+
+    def info(self) -> dict[str, Any]:
+        """`status` (`queued`, `running`, `done`, `failed`, `cancelled`, `timed_out`), what it
+        `said` last or `why` it failed, its `files`."""
+        return self._client._get(self._path)
+
+    def wait(self, timeout_s: float = 1800.0) -> dict[str, Any]:
+        """Waits until the job is over; its `info`.
+
+        Raises:
+            TimeoutError: It is not over in time.
+        """
+        end_s = time.monotonic() + timeout_s
+        while time.monotonic() < end_s:
+            info = self.info()
+            if info["status"] not in ("queued", "running"):
+                return info
+            time.sleep(0.1)
+        raise TimeoutError(f"job {self.id} is not over after {timeout_s} s")
+
+    def json(self, name: str) -> dict[str, Any]:
+        """One of its files that is JSON: `plan.json`, `diagnosis.json`."""
+        return self._client._get(f"{self._path}/files/{name}")
+
+    def download(self, name: str, to: str | Path) -> None:
+        """Writes one of its files into a new file."""
+        self._client._download(f"{self._path}/files/{name}", Path(to))
+
+    def cancel(self) -> None:
+        """Ends the job, and removes its files from the server."""
+        self._client._delete(self._path)
 
 
 class Session:
@@ -185,8 +347,12 @@ class Session:
         return self._control(action="lane_change", to=to)
 
     def quit(self) -> Acted:
-        """Ends the run and the program."""
+        """Ends the run and the session; with `run` the program too."""
         return self._control(action="quit")
+
+    def end(self) -> None:
+        """Ends the session; its summary is written when this returns."""
+        self._client._delete(self._path)
 
     def _control(self, **command: Any) -> Acted:
         answer = self._client._post(f"{self._path}/control", command)

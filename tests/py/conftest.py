@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from browsing import FLAGS, opened
+from playwright.sync_api import Browser, Page, sync_playwright
 
 WORKSPACE = Path(__file__).resolve().parents[2]
 
@@ -43,3 +47,30 @@ def short_run(server: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     ]
     subprocess.run(command, check=True, capture_output=True, timeout=120)
     return folder
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    """Headless Chromium; tests are skipped where there is none."""
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    if program is None:
+        pytest.skip("no chromium")
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=program, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A page that fails the test on any error of a script, the console or a request.
+
+    Without the page's policy, which forbids the `eval` of Playwright's waiting functions.
+    """
+    yield from opened(browser, bypass_csp=True)
+
+
+@pytest.fixture
+def strict_page(browser: Browser) -> Iterator[Page]:
+    """As `page`, under the policy that a user's browser follows."""
+    yield from opened(browser, bypass_csp=False)

@@ -36,15 +36,20 @@ def running(
     server: Path, folder: Path, *options: str, port: str = "0"
 ) -> Iterator[Run]:
     """Starts a run with a dashboard, on a free port if none is named."""
-    command: list[str | Path] = [
-        server,
-        "run",
-        "--port",
-        port,
-        "--out",
-        folder,
-        *options,
-    ]
+    with started(server, "run", "--port", port, "--out", folder, *options) as run:
+        yield run
+
+
+@contextmanager
+def serving(server: Path, runs: Path, *options: str) -> Iterator[Run]:
+    """Starts a server without a run, on a free port."""
+    with started(server, "serve", "--port", "0", "--runs", runs, *options) as run:
+        yield run
+
+
+@contextmanager
+def started(*command: str | Path) -> Iterator[Run]:
+    """Starts the program, and reads its address."""
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stderr is not None

@@ -6,74 +6,18 @@ import json
 import math
 import os
 import re
-import shutil
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, ViewportSize, sync_playwright
+from browsing import WAIT_MS, contrast
+from playwright.sync_api import Browser, Page
 from running import Run, running
 
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-WAIT_MS = 30_000
 SET_SPEED_IS_20 = """fetch('/api/v1/state').then(a => a.json())
     .then(state => state.run.set_speed_m_s === 20)"""
-
-
-@pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
-    """Headless Chromium; tests are skipped where there is none."""
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
-    if program is None:
-        pytest.skip("no chromium")
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=program, args=FLAGS)
-        yield chromium
-        chromium.close()
-
-
-@pytest.fixture
-def page(browser: Browser) -> Iterator[Page]:
-    """A page that fails the test on any error of a script, the console or a request.
-
-    Without the page's policy, which forbids the `eval` of Playwright's waiting functions.
-    """
-    yield from opened(browser, bypass_csp=True)
-
-
-@pytest.fixture
-def strict_page(browser: Browser) -> Iterator[Page]:
-    """As `page`, under the policy that a user's browser follows."""
-    yield from opened(browser, bypass_csp=False)
-
-
-def opened(browser: Browser, bypass_csp: bool) -> Iterator[Page]:
-    """A tab that must not see an error."""
-    size: ViewportSize = {"width": 1440, "height": 960}
-    tab = browser.new_page(viewport=size, bypass_csp=bypass_csp)
-    tab.set_default_timeout(WAIT_MS)
-    wrong: list[str] = []
-    tab.on(
-        "console",
-        lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None,
-    )
-    tab.on("pageerror", lambda e: wrong.append(str(e)))
-    tab.on("requestfailed", lambda r: wrong.append(r.url))
-    yield tab
-    tab.close()
-    assert wrong == []
 
 
 def shown(page: Page, element: str) -> float:
@@ -421,26 +365,6 @@ def luminance(page: Page, element: str) -> float:
         f"getComputedStyle(document.querySelector('{element}')).backgroundColor"
     )
     return sum(float(v) for v in re.findall(r"[\d.]+", ground)[:3]) / 3
-
-
-def contrast(page: Page, element: str) -> float:
-    """Contrast of an element's text on its ground (WCAG 2.2)."""
-    script = """(selector) => {
-      const rgb = (text) => text.match(/[\\d.]+/g).map(Number);
-      const light = (c) => c.slice(0, 3).map((v) => v / 255)
-        .map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
-        .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-      let node = document.querySelector(selector);
-      const text = rgb(getComputedStyle(node).color);
-      let ground = rgb(getComputedStyle(node).backgroundColor);
-      while (ground[3] === 0) {
-        node = node.parentElement;
-        ground = rgb(getComputedStyle(node).backgroundColor);
-      }
-      const [a, b] = [light(text), light(ground)].sort((x, y) => y - x);
-      return (a + 0.05) / (b + 0.05);
-    }"""
-    return float(page.evaluate(script, element))
 
 
 def test_light_and_dark_follow_the_system_or_the_choice_and_can_be_read(

@@ -30,7 +30,7 @@ pub use error::RecordingError;
 pub use inputs::{About, BusCall, BusTrace, DriverWish, GivenStep, Inputs, SentFrame};
 pub use reader::{Entry, Reader, Wanted};
 pub use recorder::{Backlog, BusHeader, Listener, Recording, RunHeader, Torn};
-pub use recover::{Recovered, recover};
+pub use recover::{Recovered, recover, recover_into};
 pub use schedule::{Due, Schedule};
 pub use telemetry::{Combination, Geodesy, Scenery, lanes_at_start, messages, static_frames};
 pub use topic::{TOPICS, Topic, TopicMessage};

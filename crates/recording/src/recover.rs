@@ -39,6 +39,14 @@ pub struct Recovered {
 /// [`RecordingError::Read`] when the file cannot be read or is no MCAP file;
 /// [`RecordingError::Write`] when the new one exists or cannot be written.
 pub fn recover(path: &Path) -> Result<Recovered, RecordingError> {
+    recover_into(path, &path.with_extension("recovered.mcap"))
+}
+
+/// As [`recover`], into a file of that name. The recording may still be written to.
+///
+/// # Errors
+/// As [`recover`].
+pub fn recover_into(path: &Path, target: &Path) -> Result<Recovered, RecordingError> {
     let input = File::open(path).map_err(|e| RecordingError::read(path, e))?;
     let bytes = input.metadata().map_err(|e| RecordingError::read(path, e))?.len();
     let mut reader = Records::new(BufReader::new(input), bytes);
@@ -46,14 +54,14 @@ pub fn recover(path: &Path) -> Result<Recovered, RecordingError> {
         Some((op::HEADER, _)) => {}
         _ => return Err(RecordingError::read(path, "not an MCAP file")),
     }
-    let target = path.with_extension("recovered.mcap");
-    let output = File::create_new(&target).map_err(|e| RecordingError::write(&target, e))?;
+    let output = File::create_new(target).map_err(|e| RecordingError::write(target, e))?;
     let failed = |e: mcap::McapError| {
-        let _ = std::fs::remove_file(&target);
-        RecordingError::write(&target, e)
+        let _ = std::fs::remove_file(target);
+        RecordingError::write(target, e)
     };
     let writer = write_options().create(BufWriter::new(output)).map_err(failed)?;
-    let mut copy = Copy { writer, kept: Recovered { file: target.clone(), ..Default::default() } };
+    let mut copy =
+        Copy { writer, kept: Recovered { file: target.to_owned(), ..Default::default() } };
     loop {
         match reader.next_record() {
             Ok(Some((op::DATA_END, _))) => break,

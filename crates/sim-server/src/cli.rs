@@ -53,6 +53,8 @@ pub(crate) enum Command {
     /// Lists and shows the built-in scenarios.
     #[command(subcommand)]
     Scenario(cmd::scenario::Command),
+    /// Serves sessions that are asked for over HTTP.
+    Serve(cmd::serve::Args),
 }
 
 impl Cli {

@@ -7,6 +7,7 @@ use crate::failure::Failure;
 use crate::session::Handle;
 
 /// The networks that a session is shown on.
+#[derive(Default)]
 pub(crate) struct Listeners {
     #[cfg(feature = "ros2")]
     ros2: Option<ros2::Node>,

@@ -10,14 +10,17 @@ mod dashboard;
 mod failure;
 #[cfg(feature = "foxglove")]
 mod foxglove_live;
+mod jobs;
 mod listeners;
 mod out_folder;
 mod output;
 mod picture;
 mod progress;
 mod provenance;
+mod replayed;
 #[cfg(feature = "ros2")]
 mod ros2_node;
+mod run_folder;
 mod session;
 mod signals;
 mod threads;

@@ -102,6 +102,38 @@ impl OutFolder {
         Ok(Self(Arc::new(Mutex::new(state))))
     }
 
+    /// Makes a folder that was not there: the first of these names that is free.
+    ///
+    /// # Errors
+    /// [`Failure`] names the folder that cannot be made.
+    pub(crate) fn fresh(
+        parent: &Path,
+        names: impl Iterator<Item = String>,
+        results: &'static [&'static str],
+    ) -> Result<Self, Failure> {
+        for name in names {
+            let folder = parent.join(name);
+            if folder.symlink_metadata().is_ok() {
+                continue;
+            }
+            let out = Self::new(folder.clone(), false, results)?;
+            let mut state = lock(&out.0);
+            state.remember_missing();
+            std::fs::create_dir_all(parent).map_err(|e| Failure::writing(parent, &e))?;
+            match std::fs::create_dir(&folder) {
+                Ok(()) => {
+                    state.open = true;
+                    drop(state);
+                    return Ok(out);
+                }
+                // Another run was quicker: its folder is not ours to remove
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => state.made.clear(),
+                Err(e) => return Err(Failure::writing(&folder, &e)),
+            }
+        }
+        Err(Failure::Work(format!("{}: too many runs", parent.display())))
+    }
+
     /// The folder.
     pub(crate) fn path(&self) -> PathBuf {
         lock(&self.0).folder.clone()
@@ -197,6 +229,11 @@ impl State {
 
     /// Makes the folder, and remembers which of its parents were not there.
     fn make_folder(&mut self) -> Result<(), Failure> {
+        self.remember_missing();
+        std::fs::create_dir_all(&self.folder).map_err(|e| Failure::writing(&self.folder, &e))
+    }
+
+    fn remember_missing(&mut self) {
         let missing = self
             .folder
             .ancestors()
@@ -204,7 +241,6 @@ impl State {
         let mut missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         missing.reverse();
         self.made = missing;
-        std::fs::create_dir_all(&self.folder).map_err(|e| Failure::writing(&self.folder, &e))
     }
 
     fn put_aside(&mut self, name: &str) -> Result<(), Failure> {

@@ -24,6 +24,11 @@ impl Progress {
         Self(Shown::new(Some(length_m), "{bar:32} {percent:>3} %  {msg}"))
     }
 
+    /// Shown to nobody.
+    pub(crate) const fn hidden() -> Self {
+        Self(Shown::Nowhere)
+    }
+
     /// Moves to where the ego is.
     pub(crate) fn show(&self, world: &World) {
         let ego = world.truck().state();
@@ -66,6 +71,7 @@ impl Stages {
 
 /// Where progress is shown.
 enum Shown {
+    Nowhere,
     Terminal(ProgressBar),
     Lines(Lines),
 }
@@ -87,6 +93,7 @@ impl Shown {
 
     fn show(&self, position: u64, what: String) {
         match self {
+            Self::Nowhere => {}
             Self::Terminal(bar) => {
                 bar.set_position(position);
                 bar.set_message(what);
@@ -99,6 +106,7 @@ impl Shown {
 
     fn finish(&self) {
         match self {
+            Self::Nowhere => {}
             Self::Terminal(bar) => bar.finish_and_clear(),
             Self::Lines(lines) => {
                 let _ = lines.end.send(());

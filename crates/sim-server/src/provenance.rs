@@ -20,6 +20,11 @@ impl Provenance {
             seed,
         })
     }
+
+    /// The seed.
+    pub(crate) const fn seed(self) -> u64 {
+        self.0.seed
+    }
 }
 
 impl From<Provenance> for tractrix_core::Provenance {

@@ -100,9 +100,10 @@ fn refused(why: &Refused) -> ros2::Refused {
     let text = why.to_string();
     match why {
         Refused::WrongState { .. } | Refused::Ended => ros2::Refused::IncorrectState(text),
-        Refused::NoExternalDecider | Refused::OutsideBus(_) | Refused::OneSumo => {
-            ros2::Refused::Unsupported(text)
-        }
+        Refused::NoExternalDecider
+        | Refused::OutsideBus(_)
+        | Refused::OneSumo
+        | Refused::SecondSumo => ros2::Refused::Unsupported(text),
         Refused::TooMany
         | Refused::CutShort { .. }
         | Refused::TooFar { .. }

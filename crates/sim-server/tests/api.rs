@@ -15,7 +15,7 @@ use std::process::{Child, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
-use support::program;
+use support::{client, program};
 
 /// A run with a dashboard on a free port.
 struct Run {
@@ -44,35 +44,7 @@ impl Run {
 
     /// Status and body of a request.
     fn ask(&self, method: &str, path: &str, more_headers: &str, body: &[u8]) -> (u16, Value) {
-        let mut stream = TcpStream::connect(&self.address).unwrap();
-        stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
-        let host = if more_headers.contains("Host:") {
-            String::new()
-        } else {
-            format!("Host: {}\r\n", self.address)
-        };
-        let length = if more_headers.contains("Content-Length:") {
-            String::new()
-        } else {
-            format!("Content-Length: {}\r\n", body.len())
-        };
-        let kind = if more_headers.contains("Content-Type:") {
-            ""
-        } else {
-            "Content-Type: application/json\r\n"
-        };
-        let head = format!(
-            "{method} {path} HTTP/1.1\r\n{host}{more_headers}{length}{kind}Connection: close\r\n\r\n"
-        );
-        stream.write_all(&[head.as_bytes(), body].concat()).unwrap();
-        let mut answer = String::new();
-        stream.read_to_string(&mut answer).unwrap();
-        let (head, body) = answer.split_once("\r\n\r\n").unwrap_or_else(|| panic!("{answer}"));
-        let status: u16 = head.split_whitespace().nth(1).unwrap().parse().unwrap();
-        let kind = if status < 400 { "application/json" } else { "application/problem+json" };
-        let head = head.to_ascii_lowercase();
-        assert!(head.contains(&format!("content-type: {kind}")), "{head}");
-        (status, serde_json::from_str(body).unwrap())
+        client::ask(&self.address, method, path, more_headers, body)
     }
 
     fn control(&self, body: &str) -> (u16, Value) {
@@ -210,10 +182,7 @@ fn the_one_session_is_listed_and_others_are_not_there() {
 
 /// The body of an answer of any kind.
 fn text(run: &Run, path: &str) -> String {
-    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
-    let mut answer = String::new();
-    sent(run, &request).read_to_string(&mut answer).unwrap();
-    answer
+    client::text(&run.address, path)
 }
 
 #[test]
@@ -241,7 +210,9 @@ fn a_monitor_can_ask_how_the_run_goes() {
 /// The value of a metric.
 fn counted(run: &Run, name: &str) -> f64 {
     let answer = text(run, "/api/v1/metrics");
-    let line = answer.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    let line = answer
+        .lines()
+        .find_map(|line| line.strip_prefix(name)?.strip_prefix("{session=\"default\"} "));
     line.unwrap_or_else(|| panic!("{name}: {answer}")).parse().unwrap()
 }
 

@@ -31,6 +31,23 @@ impl Scenario {
         .filter_map(|(key, reaches)| reaches.then_some(key))
         .collect()
     }
+
+    /// The files among what [`Self::reaches_out`] names, by their keys.
+    pub fn files_mut(&mut self) -> Vec<(&'static str, &mut String)> {
+        let outside = self.reaches_out();
+        let traffic = &mut self.traffic;
+        [
+            ("road", Some(&mut self.road)),
+            ("truck.file", Some(&mut self.truck.file)),
+            ("policy_file", self.policy_file.as_mut()),
+            ("traffic.manifest", traffic.manifest.as_mut()),
+            ("traffic.detectors", traffic.detectors.as_mut()),
+            ("traffic.replay.file", traffic.replay.file.as_mut()),
+        ]
+        .into_iter()
+        .filter_map(|(key, file)| outside.contains(&key).then_some((key, file?)))
+        .collect()
+    }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ pub(crate) mod recover;
 pub(crate) mod replay;
 pub(crate) mod run;
 pub(crate) mod scenario;
+pub(crate) mod serve;
 pub(crate) mod traffic;
 pub(crate) mod truck;
 
@@ -42,5 +43,6 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Ecu(args)) => ecu::run(&args),
         Some(Command::Truck(command)) => truck::run(&command),
         Some(Command::Scenario(command)) => scenario::run(&command),
+        Some(Command::Serve(args)) => serve::run(&args),
     }
 }

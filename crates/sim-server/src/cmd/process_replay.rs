@@ -1,9 +1,5 @@
 //! `process-replay RUN.mcap`: the recorded inputs through the stack again, every command compared.
 
-mod compare;
-mod recorded;
-mod setup;
-
 use std::path::PathBuf;
 
 use clap::{Parser, ValueEnum};
@@ -15,13 +11,14 @@ use recording::{BusCall, DriverWish, GivenStep, Inputs};
 use serde::Serialize;
 use tractrix_core::{Command, PoseSource, Time, Vehicle, VehicleLimits};
 
-use self::compare::{Comparison, Difference};
-use self::recorded::{AsRecorded, RecordedBus, RecordedPose, RecordedTraffic, RecordedVehicle};
-use self::setup::{Setup, driver_setup};
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Stages;
 use crate::provenance::Provenance;
+use crate::replayed::{
+    AsRecorded, Comparison, Difference, RecordedBus, RecordedPose, RecordedTraffic,
+    RecordedVehicle, Setup, driver_setup,
+};
 
 /// Drives the stack again with what it was given in a recording, and compares every command bit for
 /// bit. Exit code 1: something differs.
@@ -98,7 +95,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn replay(args: &Args, stages: &Stages) -> Result<(Provenance, Comparison), Failure> {
     let mut inputs = Inputs::open(&args.file, args.from == From::Frames)?;
     let about = inputs.about().clone();
-    let mut setup = Setup::new(args, &about)?;
+    let mut setup = Setup::new(&args.file, &about, &args.set, args.road.as_deref())?;
     let seed = about.value("run", "seed").and_then(|seed| seed.parse().ok());
     let mut comparison = Comparison::default();
     let mut drive: Option<(Stack, VehicleLimits, Option<Driver>)> = None;

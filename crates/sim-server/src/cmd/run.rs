@@ -6,13 +6,13 @@ use clap::Parser;
 use clap::builder::RangedU64ValueParser;
 
 use crate::cli::positive;
+use crate::dashboard::AccessArgs;
 use crate::failure::Failure;
 use crate::session::Pace;
 
 mod execute;
 mod options;
 mod report;
-mod runs;
 
 /// Drives a scenario in closed loop, with a live dashboard, and records it.
 #[derive(Debug, Parser)]
@@ -75,9 +75,11 @@ pub(crate) struct Args {
     /// No dashboard.
     #[arg(long)]
     headless: bool,
-    /// Port of the dashboard on 127.0.0.1; 0 takes a free one.
+    /// Port of the dashboard; 0 takes a free one.
     #[arg(long, default_value_t = 8080, value_parser = RangedU64ValueParser::<u16>::new())]
     port: u16,
+    #[command(flatten)]
+    access: AccessArgs,
     /// Keeps the dashboard open after the end, until Ctrl-C, SIGTERM or SIGHUP.
     #[arg(long, conflicts_with = "headless")]
     keep_open: bool,

@@ -4,31 +4,37 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Bytes;
-use axum::extract::State;
-use axum::extract::rejection::BytesRejection;
+use axum::extract::rejection::{BytesRejection, QueryRejection};
+use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use utoipa::IntoParams;
+
+use super::hub::{Hub, Of};
 use super::openapi::{ActedObject, CommandObject, FrameObject, Health};
 use super::{Shared, gate, problem};
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
-use crate::session::{self, Acted, Command, Handle, Refused, Wish};
+use crate::session::{self, Acted, Command, DEFAULT, Handle, Refused, Wish};
 
 pub(super) fn json(status: StatusCode, body: String) -> Response {
     (status, [(header::CONTENT_TYPE, "application/json")], body).into_response()
 }
 
 /// The latest frame.
-#[utoipa::path(get, path = "/state", params(("session" = String, Path, description = "Id of a session: `default`")), responses((status = 200, body = FrameObject)))]
-pub(super) async fn state(State(shared): State<Arc<Shared>>) -> Response {
+#[utoipa::path(get, path = "/state", params(("session" = String, Path, description = "Id of a session; `run` has `default`")), responses((status = 200, body = FrameObject)))]
+pub(super) async fn state(Of(shared): Of) -> Response {
     let frame = Arc::clone(&shared.frame.borrow().json);
     if frame.is_empty() { problem::no_tick_yet() } else { json(StatusCode::OK, frame.to_string()) }
 }
 
-/// Says that there is a run to look at.
+/// Says that the server can be used: the run that it was started with, if it was, has begun.
 #[utoipa::path(get, path = "/api/v1/ready", responses((status = 200, body = Health)))]
-pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Response {
-    if shared.frame.borrow().json.is_empty() {
+pub(super) async fn ready(State(hub): State<Arc<Hub>>) -> Response {
+    let waits = |session: &Shared| session.frame.borrow().json.is_empty();
+    if hub.sessions.get(DEFAULT).is_some_and(|session| waits(&session)) {
         return problem::no_tick_yet();
     }
     json(StatusCode::OK, serde_json::json!({ "schema": SCHEMA, "status": "ready" }).to_string())
@@ -36,22 +42,78 @@ pub(super) async fn ready(State(shared): State<Arc<Shared>>) -> Response {
 
 /// Counts and times, OpenMetrics.
 #[utoipa::path(get, path = "/api/v1/metrics", responses((status = 200, body = String, content_type = "application/openmetrics-text")))]
-pub(super) async fn metrics(State(shared): State<Arc<Shared>>) -> Response {
+pub(super) async fn metrics(State(hub): State<Arc<Hub>>) -> Response {
+    hub.metrics.sessions.set(i64::try_from(hub.sessions.count()).unwrap_or(i64::MAX));
     let kind = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-    ([(header::CONTENT_TYPE, kind)], shared.metrics.text()).into_response()
+    ([(header::CONTENT_TYPE, kind)], hub.metrics.text()).into_response()
 }
 
 /// The summary so far, the final one after the end.
-#[utoipa::path(get, path = "/summary", params(("session" = String, Path, description = "Id of a session: `default`")), responses((status = 200, body = Object)))]
-pub(super) async fn summary(State(shared): State<Arc<Shared>>) -> Response {
+#[utoipa::path(get, path = "/summary", params(("session" = String, Path, description = "Id of a session; `run` has `default`")), responses((status = 200, body = Object)))]
+pub(super) async fn summary(Of(shared): Of) -> Response {
     let summary = shared.summary().to_string();
     json(StatusCode::OK, summary)
 }
 
 /// The road's geometry and the truck's lengths.
-#[utoipa::path(get, path = "/road", params(("session" = String, Path, description = "Id of a session: `default`")), responses((status = 200, body = Object)))]
-pub(super) async fn road(State(shared): State<Arc<Shared>>) -> Response {
+#[utoipa::path(get, path = "/road", params(("session" = String, Path, description = "Id of a session; `run` has `default`")), responses((status = 200, body = Object)))]
+pub(super) async fn road(Of(shared): Of) -> Response {
     json(StatusCode::OK, shared.setting().road.to_string())
+}
+
+/// From which number on.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Since {
+    /// `next` of the answer before; without it all that are here.
+    #[param(nullable = false)]
+    since: Option<u64>,
+}
+
+/// The last frames, 20 a second of wall time; 200 are kept.
+#[utoipa::path(get, path = "/frames", params(("session" = String, Path, description = "Id of a session; `run` has `default`"), Since), responses((status = 200, body = Object)))]
+pub(super) async fn frames(
+    Of(shared): Of,
+    since: Result<Query<Since>, QueryRejection>,
+) -> Response {
+    let Query(Since { since }) = match since {
+        Ok(since) => since,
+        Err(why) => return problem::wrong_query(&why.body_text()),
+    };
+    let (frames, next) = shared.frames_since(since.unwrap_or(0));
+    let body = format!(
+        "{{\"schema\":{SCHEMA},\"next\":{next},\"frames\":[{}]}}",
+        frames.iter().map(|frame| &**frame).collect::<Vec<_>>().join(",")
+    );
+    json(StatusCode::OK, body)
+}
+
+/// What happened: runs, states, manoeuvres, refusals, the guard, wheels off the road, collisions;
+/// the last 1,000.
+#[utoipa::path(get, path = "/events", params(("session" = String, Path, description = "Id of a session; `run` has `default`"), Since), responses((status = 200, body = Object)))]
+pub(super) async fn events(
+    Of(shared): Of,
+    since: Result<Query<Since>, QueryRejection>,
+) -> Response {
+    let Query(Since { since }) = match since {
+        Ok(since) => since,
+        Err(why) => return problem::wrong_query(&why.body_text()),
+    };
+    let (events, next) = shared.events().since(since.unwrap_or(0));
+    let body = serde_json::json!({ "schema": SCHEMA, "next": next, "events": events });
+    json(StatusCode::OK, body.to_string())
+}
+
+/// The truck and the vehicles around it at the latest tick.
+#[utoipa::path(get, path = "/entities", params(("session" = String, Path, description = "Id of a session; `run` has `default`")), responses((status = 200, body = Object)))]
+pub(super) async fn entities(Of(shared): Of) -> Response {
+    let bodies = shared.handle.bodies();
+    let body = serde_json::json!({
+        "schema": SCHEMA, "time_s": bodies.time.seconds(), "ego": bodies.ego,
+        "vehicles": bodies.others,
+    });
+    json(StatusCode::OK, body.to_string())
 }
 
 /// Says that the server answers.
@@ -65,9 +127,9 @@ pub(super) async fn health() -> Response {
 
 /// Carries out a command, between two ticks; a step with `"wait": true` is answered when it is
 /// driven.
-#[utoipa::path(post, path = "/control", params(("session" = String, Path, description = "Id of a session: `default`")), request_body = CommandObject, responses((status = 200, body = ActedObject)))]
+#[utoipa::path(post, path = "/control", params(("session" = String, Path, description = "Id of a session; `run` has `default`")), request_body = CommandObject, responses((status = 200, body = ActedObject)))]
 pub(super) async fn control(
-    State(shared): State<Arc<Shared>>,
+    Of(shared): Of,
     headers: HeaderMap,
     body: Result<Bytes, BytesRejection>,
 ) -> Response {
@@ -82,12 +144,7 @@ pub(super) async fn control(
     let answered = tokio::time::timeout(LONGEST_WAIT, carry_out(shared.handle.clone(), wish));
     match answered.await {
         Ok(Ok(acted)) => {
-            let mut body = serde_json::json!({ "schema": SCHEMA });
-            if let (Some(body), Ok(serde_json::Value::Object(acted))) =
-                (body.as_object_mut(), serde_json::to_value(acted))
-            {
-                body.extend(acted);
-            }
+            let body = with(serde_json::json!({ "schema": SCHEMA }), &acted);
             json(StatusCode::OK, body.to_string())
         }
         Ok(Err(why)) => problem::refused(&why),
@@ -95,8 +152,18 @@ pub(super) async fn control(
     }
 }
 
+/// An object with the keys of another one.
+pub(super) fn with(mut body: Value, more: &impl Serialize) -> Value {
+    if let (Some(body), Ok(Value::Object(more))) =
+        (body.as_object_mut(), serde_json::to_value(more))
+    {
+        body.extend(more);
+    }
+    body
+}
+
 /// A million ticks at the speed of a slow machine.
-const LONGEST_WAIT: Duration = Duration::from_secs(600);
+pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(600);
 
 /// Carries out what was asked for.
 ///

@@ -1,4 +1,4 @@
-//! The page, embedded in the binary.
+//! The pages, embedded in the binary.
 
 use std::sync::LazyLock;
 
@@ -8,16 +8,27 @@ use axum::response::{IntoResponse, Response};
 use crate::picture::plotly_js;
 
 const HTML: &str = include_str!("page/index.html");
-/// Style sheets and modules of the page by path.
-const FILES: [(&str, &str, &str); 10] = [
+/// Pages, style sheets and modules by path.
+const FILES: [(&str, &str, &str); 21] = [
+    ("/runs", PAGE, include_str!("page/runs.html")),
+    ("/compare", PAGE, include_str!("page/compare.html")),
+    ("/scenario", PAGE, include_str!("page/scenario.html")),
     ("/assets/theme.css", STYLE, include_str!("page/theme.css")),
     ("/assets/style.css", STYLE, include_str!("page/style.css")),
+    ("/assets/pages.css", STYLE, include_str!("page/pages.css")),
     ("/assets/app.js", SCRIPT, include_str!("page/app.js")),
     ("/assets/ahead.js", SCRIPT, include_str!("page/ahead.js")),
+    ("/assets/common.js", SCRIPT, include_str!("page/common.js")),
+    ("/assets/compare.js", SCRIPT, include_str!("page/compare.js")),
     ("/assets/controls.js", SCRIPT, include_str!("page/controls.js")),
     ("/assets/minimap.js", SCRIPT, include_str!("page/minimap.js")),
+    ("/assets/runs.js", SCRIPT, include_str!("page/runs.js")),
+    ("/assets/scenario.js", SCRIPT, include_str!("page/scenario.js")),
+    ("/assets/source.js", SCRIPT, include_str!("page/source.js")),
     ("/assets/strips.js", SCRIPT, include_str!("page/strips.js")),
     ("/assets/theme.js", SCRIPT, include_str!("page/theme.js")),
+    ("/assets/timebar.js", SCRIPT, include_str!("page/timebar.js")),
+    ("/assets/values.js", SCRIPT, include_str!("page/values.js")),
     ("/assets/view.js", SCRIPT, include_str!("page/view.js")),
     ("/assets/words.js", SCRIPT, include_str!("page/words.js")),
 ];
@@ -33,8 +44,8 @@ static HTML_WITH_REPORT: LazyLock<String> = LazyLock::new(|| HTML.replace(LINK[0
 /// there is one.
 pub(super) fn asset(path: &str, report: bool) -> Option<Response> {
     let (kind, body): (_, &'static str) = match path {
-        "/" if report => ("text/html; charset=utf-8", HTML_WITH_REPORT.as_str()),
-        "/" => ("text/html; charset=utf-8", HTML),
+        "/" if report => (PAGE, HTML_WITH_REPORT.as_str()),
+        "/" => (PAGE, HTML),
         "/assets/plotly.js" => (SCRIPT, PLOTLY.as_str()),
         _ => FILES.iter().find(|f| f.0 == path).map(|f| (f.1, f.2))?,
     };
@@ -44,4 +55,5 @@ pub(super) fn asset(path: &str, report: bool) -> Option<Response> {
 }
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
+const PAGE: &str = "text/html; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";

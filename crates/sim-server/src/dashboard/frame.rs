@@ -15,7 +15,7 @@ use crate::session::{Pace, RunState};
 
 /// The frame sent to viewers and answered by `/api/v1/state`.
 #[derive(Debug, Serialize)]
-pub(super) struct Frame<'a> {
+pub(super) struct Frame<'a, R> {
     #[serde(flatten)]
     pub(super) provenance: Provenance,
     /// Tells frames from strip columns on the WebSocket.
@@ -23,7 +23,8 @@ pub(super) struct Frame<'a> {
     /// Another run answers on the same port with another one.
     pub(super) run_id: &'a str,
     pub(super) time_s: f64,
-    pub(super) run: Run<'a>,
+    /// How the run goes, or went.
+    pub(super) run: R,
     pub(super) ego: Ego,
     pub(super) road: Here,
     pub(super) plan: Planned<'a>,

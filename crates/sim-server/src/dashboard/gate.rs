@@ -1,17 +1,22 @@
 //! Who may ask, with what, and what a browser may make of the answer.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::{Body, to_bytes};
-use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderValue, Method, header};
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
-use axum::response::Response;
+use axum::response::{IntoResponse, Response};
 
+use super::access::Access;
+use super::hub::Hub;
 use super::problem;
 
-/// Longest body, bytes: a control is a line.
+/// Longest body, bytes: a control is a line,
 const MAX_BODY_BYTES: usize = 16_384;
+/// a scenario has some pages.
+const MAX_SCENARIO_BYTES: usize = 262_144;
 /// A body arrives within this time.
 const BODY_TIMEOUT: Duration = Duration::from_secs(10);
 
@@ -28,17 +33,25 @@ const REPORT_POLICY: HeaderValue = HeaderValue::from_static(
 
 /// Refuses requests that another web site makes through the user's browser, and bodies that are
 /// too long or too slow; says to browsers what an answer may do.
-pub(super) async fn gate(request: Request, next: Next) -> Response {
-    let policy = if request.uri().path() == "/report" { REPORT_POLICY } else { PAGE_POLICY };
-    let mut response = if is_own(request.method(), request.headers()) {
+pub(super) async fn gate(State(hub): State<Arc<Hub>>, request: Request, next: Next) -> Response {
+    let path = request.uri().path();
+    let is_page = path != "/report" && !path.starts_with("/api/");
+    let mut response = if !is_own(&hub.access, request.method(), request.headers()) {
+        problem::foreign()
+    } else if hub.access.admits(request.headers()) {
         match with_body(request).await {
             Ok(request) => next.run(request).await,
             Err(refused) => refused,
         }
+    } else if let Some(cookie) = hub.access.cookie_for(request.uri()).filter(|_| is_page) {
+        keep_cookie(cookie)
     } else {
-        problem::foreign()
+        problem::unauthorized()
     };
     let headers = response.headers_mut();
+    let kind = text(headers, header::CONTENT_TYPE.as_str()).unwrap_or_default();
+    let is_report = kind.starts_with("text/html") && !is_page;
+    let policy = if is_report { REPORT_POLICY } else { PAGE_POLICY };
     headers.insert(header::CONTENT_SECURITY_POLICY, policy);
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
@@ -47,15 +60,28 @@ pub(super) async fn gate(request: Request, next: Next) -> Response {
     response
 }
 
+/// Sends a browser on to the page without the token in its address.
+fn keep_cookie((cookie, place): (String, String)) -> Response {
+    let mut response = StatusCode::SEE_OTHER.into_response();
+    for (name, value) in [(header::SET_COOKIE, cookie), (header::LOCATION, place)] {
+        if let Ok(value) = HeaderValue::from_str(&value) {
+            response.headers_mut().insert(name, value);
+        }
+    }
+    response
+}
+
 /// The request with its body in memory.
 async fn with_body(request: Request) -> Result<Request, Response> {
     let (head, body) = request.into_parts();
+    let may_be_long = head.uri.path() == "/api/v1/sessions";
+    let most = if may_be_long { MAX_SCENARIO_BYTES } else { MAX_BODY_BYTES };
     let announced = text(&head.headers, header::CONTENT_LENGTH.as_str());
     let announced_bytes = announced.and_then(|l| l.parse::<u64>().ok()).unwrap_or(0);
-    if announced_bytes > MAX_BODY_BYTES as u64 {
+    if announced_bytes > most as u64 {
         return Err(problem::body_not_read());
     }
-    match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, MAX_BODY_BYTES)).await {
+    match tokio::time::timeout(BODY_TIMEOUT, to_bytes(body, most)).await {
         Ok(Ok(bytes)) => Ok(Request::from_parts(head, Body::from(bytes))),
         Ok(Err(_)) => Err(problem::body_not_read()),
         Err(_) => Err(problem::body_too_slow()),
@@ -74,41 +100,23 @@ pub(super) fn is_json(headers: &HeaderMap) -> bool {
 }
 
 /// Whether the user or a page of this server asks: the `Host` is this computer (and not a foreign
-/// name bound to 127.0.0.1), the `Origin` is this server, and the browser does not say that another
+/// name that leads to it), the `Origin` is this server, and the browser does not say that another
 /// site asks. A link on another site may lead to a page.
-fn is_own(method: &Method, headers: &HeaderMap) -> bool {
+fn is_own(access: &Access, method: &Method, headers: &HeaderMap) -> bool {
     let host = text(headers, header::HOST.as_str()).unwrap_or_default();
     let origin = text(headers, header::ORIGIN.as_str());
     let opens_page = method == Method::GET
         && text(headers, "sec-fetch-mode") == Some("navigate")
         && text(headers, "sec-fetch-dest") == Some("document");
     let site = text(headers, "sec-fetch-site").unwrap_or("none");
-    is_loopback(host)
+    access.serves(host)
         && origin.is_none_or(|o| o.strip_prefix("http://") == Some(host))
         && (opens_page || matches!(site, "none" | "same-origin"))
-}
-
-fn is_loopback(host: &str) -> bool {
-    let name = match host.rsplit_once(':') {
-        Some((name, port)) if port.parse::<u16>().is_ok() => name,
-        _ => host,
-    };
-    matches!(name, "127.0.0.1" | "localhost" | "[::1]")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn only_loopback_names_are_served() {
-        for good in ["127.0.0.1:8080", "localhost:8080", "localhost", "[::1]:8080", "[::1]"] {
-            assert!(is_loopback(good), "{good}");
-        }
-        for bad in ["", "evil.example:8080", "127.0.0.1.evil.example", "localhost:x", "::1"] {
-            assert!(!is_loopback(bad), "{bad}");
-        }
-    }
 
     #[test]
     fn another_site_may_link_to_a_page_and_nothing_else() {
@@ -118,7 +126,7 @@ mod tests {
             let all = all.map(|(name, value)| {
                 (header::HeaderName::from_static(name), HeaderValue::from_static(value))
             });
-            is_own(&method, &all.collect())
+            is_own(&Access::loopback(), &method, &all.collect())
         };
         assert!(asks(Method::POST, &[]), "a program");
         assert!(asks(Method::POST, &[("origin", "http://127.0.0.1:8080")]));

@@ -1,17 +1,46 @@
-//! What a monitoring system may ask: counts and times of the session since the program started.
+//! What a monitoring system may ask: counts and times of each session since it began.
 
+use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::time::Duration;
 
+use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
+use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::metrics::histogram::{Histogram, exponential_buckets};
 use prometheus_client::registry::{Registry, Unit};
 
-/// The counters, and the registry that writes them in the OpenMetrics text format.
+/// Of which session a figure is.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct Of {
+    session: String,
+}
+
+/// The figures, and the registry that writes them in the OpenMetrics text format.
 pub(crate) struct Metrics {
     registry: Registry,
+    figures: Figures,
+    pub(super) sessions: Gauge,
+}
+
+/// A figure of each session.
+#[derive(Clone)]
+struct Figures {
+    ticks: Family<Of, Counter>,
+    tick_time_s: Family<Of, Histogram>,
+    missed_deadlines: Family<Of, Counter>,
+    guard_ticks: Family<Of, Counter>,
+    realtime_factor: Family<Of, Gauge<f64, AtomicU64>>,
+    viewers: Family<Of, Gauge>,
+    lost_frames: Family<Of, Counter>,
+}
+
+/// The figures of one session. They go with it.
+pub(crate) struct SessionMetrics {
+    all: Arc<Metrics>,
+    of: Of,
     ticks: Counter,
     tick_time_s: Histogram,
     missed_deadlines: Counter,
@@ -22,44 +51,51 @@ pub(crate) struct Metrics {
 }
 
 impl Metrics {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Arc<Self> {
         let mut registry = Registry::with_prefix("tractrix");
         // From 10 us to 0.33 s: a tick of 10 ms lies in the middle
-        let tick_time_s = Histogram::new(exponential_buckets(1e-5, 2.0, 16));
-        let ticks = Counter::default();
-        registry.register("ticks", "Ticks driven", ticks.clone());
+        let buckets = || Histogram::new(exponential_buckets(1e-5, 2.0, 16));
+        let figures = Figures {
+            ticks: Family::default(),
+            tick_time_s: Family::new_with_constructor(buckets),
+            missed_deadlines: Family::default(),
+            guard_ticks: Family::default(),
+            realtime_factor: Family::default(),
+            viewers: Family::default(),
+            lost_frames: Family::default(),
+        };
+        let f = figures.clone();
+        registry.register("ticks", "Ticks driven", f.ticks);
         let help = "Work of a tick, wall time";
-        registry.register_with_unit("tick_time", help, Unit::Seconds, tick_time_s.clone());
-        let missed_deadlines = Counter::default();
+        registry.register_with_unit("tick_time", help, Unit::Seconds, f.tick_time_s);
         let help = "Ticks whose work ended after the next one was due";
-        registry.register("missed_deadlines", help, missed_deadlines.clone());
-        let guard_ticks = Counter::default();
-        registry.register("guard_ticks", "Ticks in which the guard acted", guard_ticks.clone());
-        let realtime_factor = Gauge::default();
+        registry.register("missed_deadlines", help, f.missed_deadlines);
+        registry.register("guard_ticks", "Ticks in which the guard acted", f.guard_ticks);
         let help = "Simulated seconds per second, lately";
-        registry.register("realtime_factor", help, realtime_factor.clone());
-        let viewers = Gauge::default();
-        registry.register("viewers", "Viewers of /ws", viewers.clone());
-        let lost_frames = Counter::default();
+        registry.register("realtime_factor", help, f.realtime_factor);
+        registry.register("viewers", "Viewers of /ws", f.viewers);
         let help = "Frames that viewers were too slow for";
-        registry.register("lost_frames", help, lost_frames.clone());
-        Self {
-            registry,
-            ticks,
-            tick_time_s,
-            missed_deadlines,
-            guard_ticks,
-            realtime_factor,
-            viewers,
-            lost_frames,
-        }
+        registry.register("lost_frames", help, f.lost_frames);
+        let sessions = Gauge::default();
+        registry.register("sessions", "Sessions", sessions.clone());
+        Arc::new(Self { registry, figures, sessions })
     }
 
-    /// A tick has been driven.
-    pub(crate) fn note_tick(&self, work: Duration, missed_deadline: bool) {
-        self.ticks.inc();
-        self.tick_time_s.observe(work.as_secs_f64());
-        self.missed_deadlines.inc_by(missed_deadline.into());
+    /// The figures of a session that begins.
+    pub(super) fn of_session(self: &Arc<Self>, id: &str) -> SessionMetrics {
+        let of = Of { session: id.to_owned() };
+        let f = &self.figures;
+        SessionMetrics {
+            ticks: f.ticks.get_or_create_owned(&of),
+            tick_time_s: f.tick_time_s.get_or_create_owned(&of),
+            missed_deadlines: f.missed_deadlines.get_or_create_owned(&of),
+            guard_ticks: f.guard_ticks.get_or_create_owned(&of),
+            realtime_factor: f.realtime_factor.get_or_create_owned(&of),
+            viewers: f.viewers.get_or_create_owned(&of),
+            lost_frames: f.lost_frames.get_or_create_owned(&of),
+            all: Arc::clone(self),
+            of,
+        }
     }
 
     /// All of them as text.
@@ -68,5 +104,27 @@ impl Metrics {
         // Writing to a string does not fail
         let _ = encode(&mut text, &self.registry);
         text
+    }
+}
+
+impl SessionMetrics {
+    /// A tick has been driven.
+    pub(super) fn note_tick(&self, work: Duration, missed_deadline: bool) {
+        self.ticks.inc();
+        self.tick_time_s.observe(work.as_secs_f64());
+        self.missed_deadlines.inc_by(missed_deadline.into());
+    }
+}
+
+impl Drop for SessionMetrics {
+    fn drop(&mut self) {
+        let f = &self.all.figures;
+        f.ticks.remove(&self.of);
+        f.tick_time_s.remove(&self.of);
+        f.missed_deadlines.remove(&self.of);
+        f.guard_ticks.remove(&self.of);
+        f.realtime_factor.remove(&self.of);
+        f.viewers.remove(&self.of);
+        f.lost_frames.remove(&self.of);
     }
 }

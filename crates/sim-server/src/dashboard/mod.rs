@@ -4,39 +4,59 @@
 //! columns in [`Shared`]; it never waits for a viewer. Each viewer takes the latest frame when it
 //! can (frames between are lost to it) and all columns since its last visit (none are lost).
 
+mod access;
 mod ahead;
 mod api;
 mod assets;
 mod connections;
+mod events;
 mod frame;
 mod gate;
+mod hub;
+mod jobs;
+mod library;
 mod metrics;
+mod new_session;
 mod openapi;
+mod playback;
 mod problem;
 mod publisher;
 mod road_view;
+mod run_report;
+mod runs;
 mod server;
 mod sessions;
 mod socket;
 mod strip;
 
+use std::collections::VecDeque;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 
+pub(crate) use access::AccessArgs;
 #[cfg(feature = "foxglove")]
 pub(crate) use api::carry_out;
+pub(crate) use hub::Hub;
+pub(crate) use metrics::Metrics;
 pub(crate) use publisher::Publisher;
 pub(crate) use server::{Dashboard, bind};
 
-use self::metrics::Metrics;
+use self::events::EventLog;
+use self::metrics::SessionMetrics;
 use self::strip::Strip;
 use crate::session::Handle;
 
-/// What the world's thread leaves for the viewers.
+/// What a session's threads leave for its viewers.
 pub(crate) struct Shared {
+    /// The session's id.
+    id: Arc<str>,
     /// The latest frame.
     frame: watch::Sender<Published>,
+    /// The last frames.
+    frames: Mutex<VecDeque<(u64, Arc<str>)>>,
+    events: Mutex<EventLog>,
     /// Columns of the strip plots since the start.
     strip: Mutex<Strip>,
     /// The summary so far as JSON.
@@ -45,9 +65,9 @@ pub(crate) struct Shared {
     setting: Mutex<Setting>,
     /// To the session.
     handle: Handle,
-    metrics: Metrics,
-    /// Places for viewers.
-    viewers: Arc<Semaphore>,
+    metrics: SessionMetrics,
+    /// Ends the session between two ticks.
+    pub(crate) stop: Arc<AtomicBool>,
 }
 
 /// A frame, and what a viewer must know about it without reading it.
@@ -61,8 +81,8 @@ struct Published {
     is_last: bool,
 }
 
-/// Viewers at once, at most.
-const MAX_VIEWERS: usize = 16;
+/// Frames that are kept, at most: ten seconds of them.
+const MAX_FRAMES: usize = 200;
 
 /// What does not change during a run.
 #[derive(Clone)]
@@ -75,16 +95,30 @@ pub(crate) struct Setting {
 
 impl Shared {
     /// Nothing published yet.
-    pub(crate) fn new(setting: Setting, handle: Handle) -> Arc<Self> {
+    pub(crate) fn new(
+        id: &Arc<str>,
+        setting: Setting,
+        handle: Handle,
+        metrics: &Arc<Metrics>,
+        stop: Arc<AtomicBool>,
+    ) -> Arc<Self> {
         Arc::new(Self {
+            id: Arc::clone(id),
             frame: watch::Sender::default(),
+            frames: Mutex::default(),
+            events: Mutex::default(),
             strip: Mutex::default(),
             summary: Mutex::new(Arc::from("{}")),
             setting: Mutex::new(setting),
             handle,
-            metrics: Metrics::new(),
-            viewers: Arc::new(Semaphore::new(MAX_VIEWERS)),
+            metrics: metrics.of_session(id),
+            stop,
         })
+    }
+
+    /// The session's id.
+    pub(crate) fn id(&self) -> &str {
+        &self.id
     }
 
     /// Another run begins: what is left of the former one goes.
@@ -92,6 +126,32 @@ impl Shared {
         *self.setting.lock().unwrap_or_else(PoisonError::into_inner) = setting;
         *self.strip() = Strip::default();
         *self.summary() = Arc::from("{}");
+    }
+
+    /// Leaves a frame for the viewers.
+    fn publish(&self, json: Arc<str>, is_last: bool) {
+        let mut number = 0;
+        self.frame.send_modify(|published| {
+            number = published.number + 1;
+            *published = Published { json: Arc::clone(&json), number, is_last };
+        });
+        let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
+        if frames.len() == MAX_FRAMES {
+            frames.pop_front();
+        }
+        frames.push_back((number, json));
+    }
+
+    /// Frames from this number on that are still here, and the number of the next one.
+    fn frames_since(&self, number: u64) -> (Vec<Arc<str>>, u64) {
+        let frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
+        let wanted = frames.iter().filter(|(n, _)| *n >= number);
+        let next = frames.back().map_or(0, |(n, _)| n + 1);
+        (wanted.map(|(_, json)| Arc::clone(json)).collect(), next)
+    }
+
+    fn events(&self) -> MutexGuard<'_, EventLog> {
+        self.events.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn setting(&self) -> Setting {

@@ -25,7 +25,7 @@ pub(super) fn document() -> OpenApi {
 /// The document as text: every operation may answer with a problem.
 pub(super) fn text(mut document: OpenApi) -> String {
     for path in document.paths.paths.values_mut() {
-        for operation in [&mut path.get, &mut path.post].into_iter().flatten() {
+        for operation in [&mut path.get, &mut path.post, &mut path.delete].into_iter().flatten() {
             let problem = RefOr::T(problem_response());
             operation.responses.responses.insert("default".to_owned(), problem);
         }
@@ -108,6 +108,10 @@ pub(super) struct SessionObject {
     seed: u64,
     /// Length of a tick, s.
     tick_s: f64,
+    /// Name of the latest run.
+    run: Option<String>,
+    /// The run is being recorded.
+    recording: bool,
 }
 
 /// The sessions of a server.
@@ -115,6 +119,8 @@ pub(super) struct SessionObject {
 #[expect(dead_code, reason = "a schema")]
 pub(super) struct SessionList {
     schema: u32,
+    /// Sessions at once, at most.
+    most: usize,
     sessions: Vec<SessionObject>,
 }
 
@@ -187,7 +193,7 @@ pub(super) enum CommandObject {
         #[schema(minimum = 0, maximum = 40)]
         speed_m_s: f64,
     },
-    /// Ends the run and the program.
+    /// Ends the run and the session, with `default` the program too.
     Quit {},
 }
 

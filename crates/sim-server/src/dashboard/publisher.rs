@@ -9,10 +9,11 @@ use serde::Serialize;
 use sim::{GhostReport, Scenario, Summary, World};
 use tractrix_core::{Recorder, Tick};
 
+use super::Shared;
 use super::ahead::{Lead, SpeedAhead};
+use super::events::{Watcher, What};
 use super::frame::{Ego, Frame, GhostHere, Here, Other, Planned, Refused, Run, Snapshot};
 use super::strip::round;
-use super::{Published, Shared};
 use crate::provenance::Provenance;
 use crate::session::{Pace, RunState};
 
@@ -25,6 +26,7 @@ pub(crate) struct Publisher {
     external_decider: bool,
     road: Arc<Road>,
     snapshot: Option<Snapshot>,
+    watcher: Watcher,
     /// Wall and simulated seconds of an earlier frame, for the factor.
     mark: (f64, f64),
     realtime_factor: f64,
@@ -53,6 +55,8 @@ impl Publisher {
         scenario: &Scenario,
         road: Arc<Road>,
     ) -> Self {
+        let seed = provenance.seed();
+        shared.events().add(0.0, What::RunBegan { run_id: run_id.clone(), seed });
         Self {
             shared,
             provenance,
@@ -61,6 +65,7 @@ impl Publisher {
             external_decider: scenario.stack.decider == DeciderKind::External,
             road,
             snapshot: None,
+            watcher: Watcher::default(),
             mark: (0.0, 0.0),
             realtime_factor: 0.0,
         }
@@ -118,11 +123,8 @@ impl Publisher {
         {
             *self.shared.summary() = so_far.into();
             self.shared.metrics.realtime_factor.set(self.realtime_factor);
-            let is_last = state == RunState::Finished;
-            self.shared.frame.send_modify(|published| {
-                let number = published.number + 1;
-                *published = Published { json: frame.into(), number, is_last };
-            });
+            self.watcher.run(time_s, state, &summary, &mut self.shared.events());
+            self.shared.publish(frame.into(), state == RunState::Finished);
         }
     }
 
@@ -140,6 +142,7 @@ impl Publisher {
 impl Recorder for Publisher {
     fn record(&mut self, tick: &Tick<'_>) {
         self.shared.metrics.guard_ticks.inc_by((!tick.plan.guard.is_empty()).into());
+        self.watcher.tick(tick, &mut self.shared.events());
         let kept = self.snapshot.get_or_insert_default();
         kept.now = tick.now;
         kept.ego = *tick.ego;

@@ -1,6 +1,6 @@
-//! The HTTP server: routes and the loopback listener.
+//! The HTTP server: routes and the listener.
 
-use std::net::{Ipv4Addr, TcpListener};
+use std::net::TcpListener;
 use std::sync::Arc;
 
 use axum::Router;
@@ -12,20 +12,26 @@ use axum::routing::get;
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::{Shared, api, assets, connections, gate, openapi, problem, sessions, socket};
+use super::access::Access;
+use super::hub::{Hub, Of};
+use super::{
+    Shared, api, assets, connections, gate, jobs, library, openapi, problem, runs, sessions, socket,
+};
 use crate::failure::Failure;
+use crate::session::DEFAULT;
 
-/// The loopback listener of the dashboard. Port 0 takes any free port.
+/// The listener of the dashboard. Port 0 takes any free port.
 ///
 /// # Errors
 /// [`Failure::Input`] names the port when it is taken.
 #[expect(clippy::disallowed_methods, reason = "the shell owns the socket")]
-pub(crate) fn bind(port: u16) -> Result<TcpListener, Failure> {
-    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(|e| match e.kind() {
+pub(crate) fn bind(access: &Access, port: u16) -> Result<TcpListener, Failure> {
+    let ip = access.bind;
+    let listener = TcpListener::bind((ip, port)).map_err(|e| match e.kind() {
         std::io::ErrorKind::AddrInUse => Failure::Input(format!(
-            "port {port} on 127.0.0.1 is in use; choose another with --port, or --headless"
+            "port {port} on {ip} is in use; choose another with --port, or --headless"
         )),
-        _ => Failure::Input(format!("port {port} on 127.0.0.1: {e}")),
+        _ => Failure::Input(format!("port {port} on {ip}: {e}")),
     })?;
     listener.set_nonblocking(true).map_err(Failure::work)?;
     Ok(listener)
@@ -34,13 +40,13 @@ pub(crate) fn bind(port: u16) -> Result<TcpListener, Failure> {
 /// A dashboard ready to be served.
 pub(crate) struct Dashboard {
     listener: TcpListener,
-    shared: Arc<Shared>,
+    hub: Arc<Hub>,
 }
 
 impl Dashboard {
-    /// Serves what the world's thread leaves in `shared`.
-    pub(crate) const fn new(listener: TcpListener, shared: Arc<Shared>) -> Self {
-        Self { listener, shared }
+    /// Serves what the sessions' threads leave in `hub`.
+    pub(crate) const fn new(listener: TcpListener, hub: Arc<Hub>) -> Self {
+        Self { listener, hub }
     }
 
     /// Serves until the future is dropped.
@@ -49,26 +55,44 @@ impl Dashboard {
     /// [`Failure::Work`] when the listener fails.
     pub(crate) async fn serve(self) -> Result<(), Failure> {
         let listener = tokio::net::TcpListener::from_std(self.listener).map_err(Failure::work)?;
-        connections::serve(listener, router(self.shared)).await;
+        connections::serve(listener, router(self.hub)).await;
         Ok(())
     }
 }
 
 /// What there is of a session.
-fn session() -> OpenApiRouter<Arc<Shared>> {
+fn session() -> OpenApiRouter<Arc<Hub>> {
     OpenApiRouter::new()
         .routes(routes!(api::state))
         .routes(routes!(api::summary))
         .routes(routes!(api::road))
+        .routes(routes!(api::frames))
+        .routes(routes!(api::events))
+        .routes(routes!(api::entities))
         .routes(routes!(api::control))
 }
 
-fn router(shared: Arc<Shared>) -> Router {
-    let known = || middleware::from_fn(sessions::known);
+fn router(hub: Arc<Hub>) -> Router {
+    let one = OpenApiRouter::new().routes(routes!(sessions::one, sessions::end));
     let (documented, document) = OpenApiRouter::with_openapi(openapi::document())
-        .routes(routes!(sessions::list))
-        .merge(OpenApiRouter::new().routes(routes!(sessions::one)).layer(known()))
-        .nest("/api/v1/sessions/{session}", session().layer(known()))
+        .routes(routes!(sessions::list, sessions::create))
+        .nest("/api/v1/sessions/{session}", one.merge(session()))
+        .routes(routes!(runs::list))
+        .routes(routes!(runs::one, runs::remove))
+        .routes(routes!(runs::recording))
+        .routes(routes!(runs::report))
+        .routes(routes!(runs::road))
+        .routes(routes!(runs::strip))
+        .routes(routes!(runs::frames))
+        .routes(routes!(runs::compare))
+        .routes(routes!(library::scenarios))
+        .routes(routes!(library::scenario))
+        .routes(routes!(library::trucks))
+        .routes(routes!(jobs::plan))
+        .routes(routes!(jobs::diagnose))
+        .routes(routes!(jobs::list))
+        .routes(routes!(jobs::one, jobs::remove))
+        .routes(routes!(jobs::job_file))
         .routes(routes!(api::health))
         .routes(routes!(api::ready))
         .routes(routes!(api::metrics))
@@ -85,17 +109,18 @@ fn router(shared: Arc<Shared>) -> Router {
         .route("/ws", get(socket::upgrade))
         .fallback(page)
         .method_not_allowed_fallback(problem::wrong_method)
-        .layer(middleware::from_fn(gate::gate))
-        .with_state(shared)
+        .layer(middleware::from_fn_with_state(Arc::clone(&hub), gate::gate))
+        .with_state(hub)
 }
 
-async fn page(State(shared): State<Arc<Shared>>, uri: Uri) -> Response {
-    assets::asset(uri.path(), shared.setting().report.is_some())
-        .unwrap_or_else(|| problem::not_found(uri.path()))
+async fn page(State(hub): State<Arc<Hub>>, uri: Uri) -> Response {
+    let has_report = |session: Arc<Shared>| session.setting().report.is_some();
+    let report = hub.sessions.get(DEFAULT).is_some_and(has_report);
+    assets::asset(uri.path(), report).unwrap_or_else(|| problem::not_found(uri.path()))
 }
 
 /// The report of the diagnosis that the truck comes from.
-async fn report(State(shared): State<Arc<Shared>>) -> Response {
+async fn report(Of(session): Of) -> Response {
     let page = |text: &Arc<str>| Html(text.to_string()).into_response();
-    shared.setting().report.as_ref().map_or_else(|| problem::not_found("/report"), page)
+    session.setting().report.as_ref().map_or_else(|| problem::not_found("/report"), page)
 }

@@ -11,13 +11,13 @@ const SPACING_S: f64 = 5.0;
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct Strip {
     time_s: Vec<f64>,
-    s_m: Vec<f64>,
-    speed_m_s: Vec<f64>,
-    reference_speed_m_s: Vec<f64>,
-    engine_power_w: Vec<f64>,
-    gear: Vec<u8>,
-    fuel_used_g: Vec<f64>,
-    lateral_error_m: Vec<f64>,
+    pub(super) s_m: Vec<f64>,
+    pub(super) speed_m_s: Vec<f64>,
+    pub(super) reference_speed_m_s: Vec<f64>,
+    pub(super) engine_power_w: Vec<f64>,
+    pub(super) gear: Vec<u8>,
+    pub(super) fuel_used_g: Vec<f64>,
+    pub(super) lateral_error_m: Vec<f64>,
 }
 
 impl Strip {

@@ -126,11 +126,7 @@ impl Wish {
                 Self::Command(Command::SetSpeed(speed_m_s))
             }
             Some("pace") => {
-                let pace = take(&mut keys, "pace", "pace", Pace::VALUES, |v| match v {
-                    Value::String(text) => text.parse().ok(),
-                    Value::Number(factor) => factor.to_string().parse().ok(),
-                    _ => None,
-                })?;
+                let pace = take(&mut keys, "pace", "pace", Pace::VALUES, Pace::from_json)?;
                 Self::Command(Command::Pace(pace))
             }
             Some("lane_change") => {

@@ -1,5 +1,6 @@
 //! The door to a session: commands in, answers out, and what can be seen without asking.
 
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -62,6 +63,8 @@ pub(crate) enum Refused {
     OutsideBus(String),
     #[error("SUMO drives the traffic: its run cannot be reset, nor another one begun")]
     OneSumo,
+    #[error("SUMO drives the traffic of another session: there is one at a time")]
+    SecondSumo,
     #[error("cut short: {left} ticks were not driven")]
     CutShort { left: u64 },
     #[error("{ticks} ticks away: a step is at most {}", super::command::MAX_TICKS)]
@@ -101,6 +104,10 @@ struct View {
     scenario: Arc<Scenario>,
     seed: u64,
     bodies: Bodies,
+    /// The folder of the latest run.
+    folder: Option<PathBuf>,
+    /// It is being written.
+    is_recording: bool,
 }
 
 /// The door to a session.
@@ -120,7 +127,9 @@ pub(crate) fn channel(
 ) -> (Handle, Receiver<Asked>) {
     let (queue, asked) = sync_channel(QUEUE);
     let scenario = Arc::new(scenario.clone());
-    let view = View { state: State::Stopped, scenario, seed, bodies: Bodies::default() };
+    let bodies = Bodies::default();
+    let view =
+        View { state: State::Stopped, scenario, seed, bodies, folder: None, is_recording: false };
     let outside_bus = outside_bus.map(Arc::from);
     (Handle { queue, view: Arc::new(Mutex::new(view)), outside_bus }, asked)
 }
@@ -202,8 +211,21 @@ impl Handle {
         self.view().state = state;
     }
 
-    pub(crate) fn note_world(&self, world: &World, seed: u64) {
+    /// The folder of the latest run, and whether it is still being written.
+    pub(crate) fn recording(&self) -> (Option<PathBuf>, bool) {
+        let view = self.view();
+        (view.folder.clone(), view.is_recording)
+    }
+
+    /// A run is whole on the disk.
+    pub(super) fn note_written(&self) {
+        self.view().is_recording = false;
+    }
+
+    pub(super) fn note_world(&self, world: &World, seed: u64, folder: &Path) {
         let mut view = self.view();
+        view.folder = Some(folder.to_owned());
+        view.is_recording = true;
         view.scenario = Arc::new(world.scenario().clone());
         view.seed = seed;
         view.bodies = Bodies::default();

@@ -19,6 +19,15 @@ impl Pace {
     pub(crate) const REALTIME: Self = Self::Factor(1.0);
     /// What a pace can be, in words.
     pub(crate) const VALUES: &str = "realtime, max or a factor from 0.01 to 10000";
+
+    /// A pace as JSON has it: a word or a number.
+    pub(crate) fn from_json(value: &serde_json::Value) -> Option<Self> {
+        match value {
+            serde_json::Value::String(text) => text.parse().ok(),
+            serde_json::Value::Number(factor) => factor.to_string().parse().ok(),
+            _ => None,
+        }
+    }
 }
 
 /// Paces that make sense to a viewer and to a clock.

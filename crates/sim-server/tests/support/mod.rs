@@ -3,8 +3,12 @@
     dead_code,
     unreachable_pub,
     clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
     reason = "each test file uses its own part, and a helper that fails fails the test"
 )]
+
+pub mod client;
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -4,65 +4,84 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use sim::{Scenario, TrafficKind, World};
-use tokio::sync::Notify;
+use sim::Scenario;
 
 use super::Args;
-use super::runs::{self, Begin, Runs};
-use crate::dashboard::{self, Dashboard, Shared};
+use crate::dashboard::{self, Dashboard, Hub, Metrics, Shared};
 use crate::failure::Failure;
 use crate::listeners::Listeners;
-use crate::out_folder::OutFolder;
 use crate::output;
-use crate::session::{self, State};
+use crate::run_folder::RunFolder;
+use crate::session::{self, Begin, DEFAULT, Pace, Place, Registry, Runs, State};
 
 /// Viewers get this long to take the last frame before the server goes.
 const LAST_FRAME_TIME: Duration = Duration::from_millis(200);
 
 /// Drives the scenario as the options say.
 pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(), Failure> {
-    let listener = if args.headless { None } else { Some(dashboard::bind(args.port)?) };
-    let folder = runs::out_folder(args, seed, scenario);
-    let out = OutFolder::new(folder, args.overwrite, runs::RESULTS)?;
-    let sumo = match scenario.traffic.source {
-        TrafficKind::Sumo => out.begin("sumo")?,
-        _ => out.path().join("sumo"),
+    let access = args.access.read()?;
+    let listener = if args.headless { None } else { Some(dashboard::bind(&access, args.port)?) };
+    let place = match &args.out {
+        Some(folder) => Place::Named(folder.clone()),
+        None => Place::In("runs".into()),
     };
-    let world = World::in_folder(scenario, seed, &sumo).map_err(Failure::input)?;
+    let out = place.of_first(seed, scenario, args.overwrite)?;
+    let world = session::first_world(scenario, seed, &out)?;
     let outside_bus = args.vehicle.contains(':').then_some(args.vehicle.as_str());
     let (handle, asked) = session::channel(scenario, seed, outside_bus);
-    let shared = listener.is_some().then(|| Shared::new(runs::setting(&world), handle.clone()));
     let stop = Arc::new(AtomicBool::new(false));
+    let (sessions, metrics) = (Registry::new(1), Metrics::new());
+    let claim = sessions.claim(Some(DEFAULT));
+    let shared = listener.is_some().then_some(claim.as_ref()).flatten().map(|claim| {
+        let (setting, stop) = (session::setting(&world), Arc::clone(&stop));
+        let shared = Shared::new(claim.id(), setting, handle.clone(), &metrics, stop);
+        claim.fill(&shared);
+        shared
+    });
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()
         .build()
         .map_err(Failure::work)?;
-    let ending = Arc::new(Notify::new());
-    runtime.spawn(raise_at_signal(Arc::clone(&stop), Arc::clone(&ending)));
+    runtime.spawn(raise_at_signal(Arc::clone(&stop)));
     let listeners = Listeners::start(super::options::networks(args), &handle, runtime.handle())?;
-    let runs = Runs { args, listeners, shared: shared.clone(), handle, stop };
+    let usual = if args.headless { Pace::Max } else { Pace::REALTIME };
+    let runs = Runs {
+        place,
+        vehicle: args.vehicle.clone(),
+        pace: args.pace.unwrap_or(usual),
+        stays: args.keep_open,
+        listeners,
+        shared,
+        handle,
+        stop,
+    };
     let first = Begin { world, seed, state: State::Playing, out, waiting: None };
     let first = runs.prepare(first, asked)?;
-    if let (Some(listener), Some(shared)) = (listener, shared) {
+    if let Some(listener) = listener {
         let address = listener.local_addr().map_err(Failure::work)?;
         output::note(&format!("dashboard: http://{address}  (Ctrl-C ends the run)"));
-        runtime.spawn(Dashboard::new(listener, shared).serve());
+        let folder = match &args.out {
+            Some(folder) => RunFolder::Named(folder.clone()),
+            None => RunFolder::Of("runs".into()),
+        };
+        let hub = Hub::new(sessions, metrics, folder, None, access);
+        runtime.spawn(Dashboard::new(listener, hub).serve());
     }
-    let ended = runs.drive_all(first, &runtime, &ending);
+    let ended = runs.drive_all(first);
     if !args.headless || args.foxglove.is_some() {
         runtime.block_on(async { tokio::time::sleep(LAST_FRAME_TIME).await });
     }
+    drop(claim);
     runtime.shutdown_background();
     let (summary, json, folder) = ended?;
     super::report::report(args.json, &summary, &json, &folder)
 }
 
-/// A signal stops the run between two ticks, and ends the waiting of whoever waits for it.
-async fn raise_at_signal(stop: Arc<AtomicBool>, ending: Arc<Notify>) {
+/// A signal stops the run between two ticks, or the waiting behind its end.
+async fn raise_at_signal(stop: Arc<AtomicBool>) {
     loop {
         crate::signals::stop_signal().await;
         stop.store(true, Ordering::Relaxed);
-        ending.notify_one();
     }
 }

@@ -1,8 +1,12 @@
 // The dashboard: takes frames from /ws, fills the header and tiles, feeds views and strip plots.
 import { Ahead } from "/assets/ahead.js";
+import { ask, base, run as playedRun, session } from "/assets/common.js";
 import { enable, selectPace, startControls } from "/assets/controls.js";
 import { MiniMap } from "/assets/minimap.js";
+import { live, Recorded } from "/assets/source.js";
 import { Strips } from "/assets/strips.js";
+import { startTimeBar } from "/assets/timebar.js";
+import { Values } from "/assets/values.js";
 import { BirdView } from "/assets/view.js";
 import * as words from "/assets/words.js";
 
@@ -12,40 +16,52 @@ const { KMH, signed } = words;
 const DIESEL_G_PER_L = 832;
 const REFUSAL_SHOWN_S = 10;
 
-const road = await (await fetch("/api/v1/road")).json();
+// A server without this session has its sessions and runs to show.
+if (playedRun === null) {
+  const all = await ask("/api/v1/sessions");
+  if (all && !all.sessions.some((s) => s.id === session)) {
+    location.replace("/runs");
+    await new Promise(() => {});
+  }
+} else {
+  const [here, runs] = ["/", "/runs"].map((path) => document.querySelector(`nav a[href="${path}"]`));
+  here.removeAttribute("aria-current");
+  runs.setAttribute("aria-current", "page");
+}
+const road = await ask(`${base}/road`);
+if (!road) throw new Error("nothing to show");
 const view = new BirdView($("view"), road);
 const ahead = new Ahead($("ahead"), road);
 const map = new MiniMap($("map"), road);
 const strips = new Strips($("strips"), road);
+const values = new Values($("values"), $("vehicle"), view);
 let frame = null;
 startControls(view, () => frame);
 
 // -- telemetry -----------------------------------------------------------------------------------
-function connect() {
-  const socket = new WebSocket(`ws://${location.host}/ws`);
-  socket.onmessage = (event) => {
-    const message = JSON.parse(event.data);
-    if (message.kind === "frame") {
-      // Another run has taken the port: its road, limits and plots are other ones.
-      if (frame && frame.run_id !== message.run_id) return location.reload();
-      frame = message;
-      view.push(frame);
-      ahead.push(frame);
-      map.draw(frame.ego);
-      strips.moveTo(frame);
-      show(frame);
-    } else if (message.kind === "strip") {
-      strips.append(message);
-    }
-  };
-  socket.onclose = () => {
-    enable(null);
-    if (frame?.run.state === "finished") return setTimeout(connect, 5000);
-    $("state").dataset.state = "offline";
-    text("state", "offline");
-    setTimeout(connect, 2000);
-  };
+function take(now) {
+  // Another run has taken the port: its road, limits and plots are other ones.
+  if (frame && frame.run_id !== now.run_id) return location.reload();
+  frame = now;
+  view.push(frame);
+  ahead.push(frame);
+  map.draw(frame.ego);
+  strips.moveTo(frame);
+  values.show(frame);
+  show(frame);
 }
+
+function lost() {
+  enable(null);
+  if (frame?.run.state === "finished") return 5000;
+  $("state").dataset.state = "offline";
+  text("state", "offline");
+  return 2000;
+}
+
+const strip = (rows) => strips.append(rows);
+if (playedRun === null) live({ frame: take, strip, lost });
+else startTimeBar(new Recorded({ frame: take, strip }));
 
 // -- header and tiles ----------------------------------------------------------------------------
 const limit = (v) => v * KMH < 999 ? (v * KMH).toFixed(0) : "none";
@@ -57,7 +73,7 @@ function show(f) {
   text("scenario", run.scenario);
   $("state").dataset.state = run.state;
   text("state", run.state);
-  enable(run.state);
+  if (playedRun === null) enable(run.state);
   for (const id of ["left", "right"]) $(id).hidden = !run.external_decider;
   text("play", run.state === "paused" ? "Play" : "Pause");
   if (document.activeElement !== $("pace")) selectPace(run.pace);
@@ -81,7 +97,7 @@ function show(f) {
   const active = plan.guard.length > 0;
   $("guard-tile").classList.toggle("alert", active);
   text("guard", active ? "active" : "clear");
-  text("guard-sub", active ? plan.guard.map(words.guard).join(", ") : `${run.guard_activations} ticks`);
+  text("guard-sub", active ? plan.guard.map(words.guard).join(", ") : run.guard_activations === undefined ? "" : `${run.guard_activations} ticks`);
   decision(f);
   traffic(f);
   against(f.ghost);
@@ -140,5 +156,5 @@ function braking(ego) {
 }
 
 for (const choice of document.getElementsByName("window")) choice.onchange = () => strips.setWindow(choice.value);
-enable(null);
-connect();
+for (const choice of document.getElementsByName("over")) choice.onchange = () => strips.setOver(choice.value);
+if (frame === null) enable(null);

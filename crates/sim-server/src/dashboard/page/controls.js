@@ -1,30 +1,11 @@
 // Buttons, fields and keys: what they ask of the run, and what it refuses.
+import { ask as request, base } from "/assets/common.js";
 import { nextTheme, onTheme, theme } from "/assets/theme.js";
 
 const $ = (id) => document.getElementById(id);
 const KMH = 3.6;
-const ANSWER_SHOWN_MS = 8000;
-let hideAnswer = null;
 
-// What was refused is said in the server's words.
-function say(words) {
-  clearTimeout(hideAnswer);
-  $("answer").textContent = words;
-  $("answer").hidden = words === "";
-  if (words !== "") hideAnswer = setTimeout(() => say(""), ANSWER_SHOWN_MS);
-}
-
-async function ask(body) {
-  const headers = { "Content-Type": "application/json" };
-  try {
-    const answer = await fetch("/api/v1/control", { method: "POST", headers, body });
-    say(answer.ok ? "" : (await answer.json()).detail);
-    return answer.ok;
-  } catch {
-    say("the program does not answer");
-    return false;
-  }
-}
+const ask = async (body) => await request(`${base}/control`, { method: "POST", body }) !== null;
 
 const send = (command) => ask(JSON.stringify(command));
 
@@ -55,6 +36,9 @@ export function startControls(view, frame) {
   onTheme(() => { $("theme").textContent = `Theme: ${theme()}`; });
   $("in").onclick = () => view.zoomBy(1.35);
   $("out").onclick = () => view.zoomBy(1 / 1.35);
+
+  $("picture").onclick = () => view.picture(`tractrix-${(frame()?.time_s ?? 0).toFixed(1)}-s.png`);
+  $("colours").onchange = (e) => { view.coloursBy = e.target.value; };
 
   const onSubmit = (form, act) => { $(form).onsubmit = (e) => { e.preventDefault(); act(); }; };
   onSubmit("set-speed-form", () => send({ action: "set_speed", speed_m_s: $("set-speed-kmh").valueAsNumber / KMH }));

@@ -21,6 +21,7 @@ export class Strips {
     this.road = road;
     this.s_km = 0;
     this.window_s = Infinity;
+    this.over = "distance";
     this.revision = 0;
     onTheme(() => { this.colors = palette(NAMES); this.stale = true; });
     this.plan = { x: [], y: [] };
@@ -60,8 +61,16 @@ export class Strips {
     this.redraw();
   }
 
+  // What the plots are over: "distance" or "time".
+  setOver(choice) {
+    this.over = choice;
+    this.stale = true;
+    this.redraw();
+  }
+
   // Stations shown, km: the whole road, or the window and a fifth of its length ahead.
   range() {
+    if (this.over === "time") return [Math.max(0, this.time_s - this.window_s) || 0, Math.max(1, this.columns.time_s.at(-1) ?? 0, this.time_s ?? 0)];
     const length_km = this.road.length_m / 1000;
     if (this.window_s === Infinity) return [0, length_km];
     const { time_s, s_km } = this.columns;
@@ -78,17 +87,31 @@ export class Strips {
     this.plotly.react(this.element, this.traces(), this.layout(), { displayModeBar: false, responsive: true });
   }
 
+  // The road's profile where the truck was, for plots over time.
+  driven() {
+    const { s_m, speed_limit_m_s, grade_frac } = this.road.profile;
+    const step = s_m[1] - s_m[0];
+    const at = this.columns.s_km.map((s) => Math.min(s_m.length - 1, Math.max(0, Math.floor(s * 1000 / step))));
+    return { speed_limit_m_s: at.map((i) => speed_limit_m_s[i]), grade_frac: at.map((i) => grade_frac[i]) };
+  }
+
   traces() {
-    const c = this.columns, profile = this.road.profile, k = this.colors;
-    const s = profile.s_m.map((v) => v / 1000);
+    const isTime = this.over === "time";
+    const profile = isTime ? this.driven() : this.road.profile, k = this.colors;
+    const c = isTime ? { ...this.columns, s_km: this.columns.time_s } : this.columns;
+    const s = isTime ? c.s_km : profile.s_m.map((v) => v / 1000);
+    const whole = isTime ? [0, Math.max(...this.range())] : [0, this.road.length_m / 1000];
+    // What was planned and what is planned now join at the truck, or lie over each other in a run that is over.
+    const joins = (this.plan.x[0] ?? Infinity) >= (c.s_km.at(-1) ?? 0) - 0.1;
+    const plan = isTime ? { x: [], y: [] } : joins ? this.plan : { x: [null, ...this.plan.x], y: [null, ...this.plan.y] };
     const line = (row, name, x, y, color, more = {}) => ({
       type: "scatter", mode: "lines", name, x, y, yaxis: row === 1 ? "y" : `y${row}`,
       hovertemplate: "%{y:.1f}", ...more, line: { color, width: 1.6, ...more.line },
     });
     return [
       line(1, "limit", s, profile.speed_limit_m_s.map((v) => v * KMH), k.limit, { line: { shape: "hv", width: 1.4, dash: "dot" } }),
-      line(1, "set speed", [0, this.road.length_m / 1000], [this.set_speed, this.set_speed], k.reference, { line: { width: 1.3, dash: "dash" } }),
-      line(1, "plan", [...c.s_km, ...this.plan.x], [...c.reference, ...this.plan.y], k.plan, { line: { width: 1.5 } }),
+      line(1, "set speed", whole, [this.set_speed, this.set_speed], k.reference, { line: { width: 1.3, dash: "dash" } }),
+      line(1, "plan", [...c.s_km, ...plan.x], [...c.reference, ...plan.y], k.plan, { line: { width: 1.5 } }),
       line(1, "speed", c.s_km, c.speed, k.speed, { line: { width: 2.2 } }),
       line(2, "grade", s, profile.grade_frac.map((g) => g * 100), k.grade, { fill: "tozeroy", fillcolor: k["grade-fill"], line: { width: 1.3 } }),
       line(3, "power", c.s_km, c.power, k.power, { fill: "tozeroy", fillcolor: k["power-fill"] }),
@@ -96,6 +119,8 @@ export class Strips {
       line(5, "fuel", c.s_km, c.fuel, k.fuel, { hovertemplate: "%{y:.2f}" }),
     ];
   }
+
+  cursor() { return this.over === "time" ? this.time_s : this.s_km; }
 
   layout() {
     const total = ROWS.reduce((sum, row) => sum + row.share, 0);
@@ -106,12 +131,12 @@ export class Strips {
       font: { color: k.dim, size: 11, family: "Inter, Segoe UI, system-ui, DejaVu Sans, sans-serif" },
       margin: { l: 52, r: 16, t: 6, b: 34 },
       showlegend: false, hovermode: "x unified", hoverlabel: { bgcolor: k.panel, bordercolor: k.line, font: { color: k.text } },
-      uirevision: String(this.window_s), datarevision: this.revision,
+      uirevision: `${this.over} ${this.window_s}`, datarevision: this.revision,
       xaxis: {
-        range: this.range(), title: { text: "distance, km", standoff: 6 }, anchor: "free", position: 0,
+        range: this.range(), title: { text: this.over === "time" ? "time, s" : "distance, km", standoff: 6 }, anchor: "free", position: 0,
         gridcolor: k.grid, zeroline: false, linecolor: k.line, ticks: "outside", tickcolor: k.line, hoverformat: ".2f",
       },
-      shapes: [{ type: "line", xref: "x", yref: "paper", x0: this.s_km, x1: this.s_km, y0: 0, y1: 1, line: { color: k.cursor, width: 1 } }],
+      shapes: [{ type: "line", xref: "x", yref: "paper", x0: this.cursor(), x1: this.cursor(), y0: 0, y1: 1, line: { color: k.cursor, width: 1 } }],
     };
     let top = 1;
     ROWS.forEach((row, i) => {

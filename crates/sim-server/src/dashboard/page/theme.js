@@ -27,6 +27,17 @@ export function nextTheme() {
 
 export const onTheme = (changed) => { listeners.add(changed); changed(); };
 
+// The button and the key of a page without a run.
+export function startTheme() {
+  const button = document.getElementById("theme");
+  button.onclick = nextTheme;
+  onTheme(() => { button.textContent = `Theme: ${theme()}`; });
+  addEventListener("keydown", (e) => {
+    const writes = e.target instanceof HTMLInputElement || e.target instanceof HTMLSelectElement || e.target instanceof HTMLTextAreaElement;
+    if (e.key === "t" && !writes && !e.ctrlKey && !e.metaKey && !e.altKey) nextTheme();
+  });
+}
+
 // Colours by name from the style sheet: --road-paint is color("road-paint").
 export const color = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 export const palette = (names) => Object.fromEntries(names.map((name) => [name, color(name)]));

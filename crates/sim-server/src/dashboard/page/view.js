@@ -9,6 +9,8 @@ const NAMES = [
 ];
 const FONT = "system-ui, 'DejaVu Sans', sans-serif";
 const BEHIND = 0.34; // the truck's place across the canvas
+const LONGEST_STEP_S = 20; // between two frames that follow each other, at the fastest pace
+const LONGEST_STEP_MS = 1000;
 const LABEL_SCALE = 4; // vehicles are named from so many pixels a metre on
 
 export class BirdView {
@@ -18,6 +20,10 @@ export class BirdView {
     this.road = road;
     this.zoom = 1;
     this.frames = [];
+    this.coloursBy = "class";
+    this.chosen = null; // a vehicle that was clicked
+    this.followed = null; // the view stays with it
+    canvas.addEventListener("click", (e) => this.choose(e.offsetX, e.offsetY));
     onTheme(() => { this.colors = palette(NAMES); });
     canvas.addEventListener("wheel", (e) => { e.preventDefault(); this.zoomBy(Math.exp(-e.deltaY * 0.0015)); }, { passive: false });
     new ResizeObserver(() => this.resize()).observe(canvas);
@@ -27,6 +33,28 @@ export class BirdView {
   }
 
   zoomBy(factor) { this.zoom = Math.min(6, Math.max(0.12, this.zoom * factor)); }
+
+  // The vehicle under a place of the canvas, or none.
+  choose(x, y) {
+    if (this.frames.length === 0) return;
+    const reach = Math.max(14, 3.5 * this.scale);
+    const near = this.state().others.map((n) => [Math.hypot(...this.px(n.x_m, n.y_m).map((p, i) => p - [x, y][i])), n.id]);
+    const [distance, id] = near.reduce((a, b) => b[0] < a[0] ? b : a, [Infinity, null]);
+    this.chosen = distance < reach ? id : null;
+    if (this.chosen === null) this.followed = null;
+  }
+
+  // Saves what is seen as a file.
+  picture(name) {
+    this.draw();
+    this.canvas.toBlob((blob) => {
+      const link = document.createElement("a");
+      link.href = URL.createObjectURL(blob);
+      link.download = name;
+      link.click();
+      URL.revokeObjectURL(link.href);
+    });
+  }
 
   resize() {
     const ratio = devicePixelRatio || 1;
@@ -39,7 +67,10 @@ export class BirdView {
 
   push(frame) {
     frame.at = performance.now();
-    this.frames = [...this.frames.slice(-1), frame];
+    // After a jump in time there is nothing between the two to be seen
+    const last = this.frames.at(-1);
+    const joins = last && Math.abs(frame.time_s - last.time_s) < LONGEST_STEP_S && frame.at - last.at < LONGEST_STEP_MS;
+    this.frames = joins ? [last, frame] : [frame];
   }
 
   // The state one frame period ago, between the last two frames: smooth at the screen's rate.
@@ -66,13 +97,15 @@ export class BirdView {
     const scale = this.scale = Math.max(width, 500) / 110 * this.zoom;
     // screen from map: translate to the truck, turn by its heading, y up to y down
     const cos = Math.cos(ego.yaw_rad), sin = Math.sin(ego.yaw_rad);
+    const at = others.find((n) => n.id === this.followed) ?? ego;
     this.px = (x, y) => {
-      const dx = x - ego.x_m, dy = y - ego.y_m;
+      const dx = x - at.x_m, dy = y - at.y_m;
       return [width * BEHIND + scale * (dx * cos + dy * sin), height * 0.54 - scale * (dy * cos - dx * sin)];
     };
     this.heading = ego.yaw_rad;
-    const window = [ego.s_m - width * BEHIND / scale - 40, ego.s_m + width * (1 - BEHIND) / scale + 40];
-    this.drawDots(ego);
+    const s_m = ego.s_m + (at.x_m - ego.x_m) * cos + (at.y_m - ego.y_m) * sin;
+    const window = [s_m - width * BEHIND / scale - 40, s_m + width * (1 - BEHIND) / scale + 40];
+    this.drawDots(at);
     this.drawRoad(window);
     this.drawPath(plan, ego);
     for (const other of others) this.drawOther(other, other.id === lead);
@@ -267,18 +300,26 @@ export class BirdView {
     });
   }
 
+  // By class, or from slow (orange) over the truck's speed (grey) to fast (blue).
+  colourOf(n) {
+    if (this.coloursBy === "class") return this.colors[n.class] ?? this.colors.car;
+    const faster = (n.speed_m_s - this.frames[this.frames.length - 1].ego.speed_m_s) / 5;
+    const share = Math.round(100 * Math.min(1, Math.abs(faster)));
+    return `color-mix(in oklab, ${faster < 0 ? this.colors.car : this.colors.tractor} ${share}%, ${this.colors.truck})`;
+  }
+
   drawOther(n, isLead) {
     const { ctx, colors, scale } = this;
     this.onBody(n.x_m, n.y_m, n.yaw_rad, (ctx) => {
       const half = n.length_m / 2;
       const round = n.class === "car" ? 0.55 : 0.25;
-      this.box(ctx, -half, half, n.width_m, round, colors[n.class] ?? colors.car);
+      this.box(ctx, -half, half, n.width_m, round, this.colourOf(n));
       ctx.fillStyle = colors.glass;
       const glass = n.class === "car" ? [half * 0.28, half * 0.3] : [half - 0.95, 0.6];
       ctx.fillRect(glass[0], -n.width_m / 2 + 0.18, glass[1], n.width_m - 0.36);
       if (n.class === "car") ctx.fillRect(-half * 0.72, -n.width_m / 2 + 0.22, half * 0.25, n.width_m - 0.44);
-      if (!isLead) return;
-      ctx.strokeStyle = colors.accent;
+      if (!isLead && n.id !== this.chosen) return;
+      ctx.strokeStyle = n.id === this.chosen ? colors.text : colors.accent;
       ctx.lineWidth = Math.max(0.25, 2 / scale);
       ctx.beginPath();
       ctx.roundRect(-half - 0.3, -n.width_m / 2 - 0.3, n.length_m + 0.6, n.width_m + 0.6, round);

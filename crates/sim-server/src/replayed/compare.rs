@@ -8,23 +8,23 @@ use tractrix_core::{
 
 /// Where a drive first was another.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Difference {
+pub(crate) struct Difference {
     /// Number of the tick, from 0.
-    pub(super) tick: u64,
+    pub(crate) tick: u64,
     /// Its time, s.
-    pub(super) time_s: f64,
+    pub(crate) time_s: f64,
     /// What differs.
-    pub(super) field: String,
-    pub(super) recorded: String,
-    pub(super) replayed: String,
+    pub(crate) field: String,
+    pub(crate) recorded: String,
+    pub(crate) replayed: String,
 }
 
 /// Compares every step with the recorded one.
 #[derive(Debug, Default)]
-pub(super) struct Comparison {
-    pub(super) ticks: u64,
-    pub(super) differing: u64,
-    pub(super) first: Option<Difference>,
+pub(crate) struct Comparison {
+    pub(crate) ticks: u64,
+    pub(crate) differing: u64,
+    pub(crate) first: Option<Difference>,
     expected: Option<GivenStep>,
     /// This tick is counted.
     noted: bool,
@@ -58,12 +58,12 @@ type Fields = Vec<(String, Exact)>;
 
 impl Comparison {
     /// The step that the next one is compared with.
-    pub(super) fn expect(&mut self, step: GivenStep) {
+    pub(crate) fn expect(&mut self, step: GivenStep) {
         self.expected = Some(step);
     }
 
     /// Notes what differs in the step that was compared last.
-    pub(super) fn note(&mut self, at: &GivenStep, field: &str, recorded: &str, replayed: &str) {
+    pub(crate) fn note(&mut self, at: &GivenStep, field: &str, recorded: &str, replayed: &str) {
         self.differing += u64::from(!std::mem::replace(&mut self.noted, true));
         self.first.get_or_insert_with(|| Difference {
             tick: self.ticks.saturating_sub(1),

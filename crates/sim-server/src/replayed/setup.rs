@@ -11,13 +11,12 @@ use sim::Scenario;
 use toml::{Table, Value};
 use tractrix_core::VehicleLimits;
 
-use super::Args;
 use crate::failure::Failure;
 use crate::output;
 use crate::provenance::GIT_REVISION;
 
 /// What the stack is built of, and where it drives.
-pub(super) struct Setup {
+pub(crate) struct Setup {
     config: StackConfig,
     policy_file: Option<String>,
     road: Arc<Road>,
@@ -26,23 +25,27 @@ pub(super) struct Setup {
 }
 
 impl Setup {
-    /// From what a recording says, with the changes of the command line.
+    /// From what a recording says, with these changes `KEY=VALUE`, on another road if one is named.
     ///
     /// # Errors
     /// [`Failure::Input`] names what the file lacks, or the key or road that cannot be used.
-    pub(super) fn new(args: &Args, about: &About) -> Result<Self, Failure> {
-        let file = &args.file;
+    pub(crate) fn new(
+        file: &Path,
+        about: &About,
+        changes: &[String],
+        other_road: Option<&str>,
+    ) -> Result<Self, Failure> {
         let lacks = |what: &str| Failure::file(file, format!("it has no {what}"));
         let attached = about.text("stack.toml").ok_or_else(|| lacks("stack.toml"))?;
         let mut table: Table =
             attached.parse().map_err(|e| Failure::file(file, format!("stack.toml: {e}")))?;
-        for change in &args.set {
+        for change in changes {
             set(&mut table, change)?;
         }
         let config = Value::Table(table).try_into::<StackConfig>();
-        let config = config.map_err(|e| match args.set.is_empty() {
+        let config = config.map_err(|e| match changes.is_empty() {
             true => Failure::file(file, format!("stack.toml: {e}")),
-            false => Failure::Input(format!("--set {}: {e}", args.set.join(" --set "))),
+            false => Failure::Input(format!("--set {}: {e}", changes.join(" --set "))),
         })?;
         let scenario = match about.text("scenario.toml") {
             Some(text) => Some(
@@ -52,7 +55,7 @@ impl Setup {
             None => None,
         };
         let driven = about.value("run", "road");
-        let road = match (&args.road, about.text("road.xodr"), &scenario, driven) {
+        let road = match (other_road, about.text("road.xodr"), &scenario, driven) {
             (Some(name), ..) => Road::load(name),
             (None, Some(text), ..) => Road::from_xodr(driven.unwrap_or("road.xodr"), text),
             (None, None, Some(scenario), _) => Ok(scenario.load_road().map_err(Failure::input)?),
@@ -62,7 +65,7 @@ impl Setup {
         let road = road.map_err(Failure::input)?;
         let found = sim::road_fingerprint(&road);
         match about.value("run", "road_fingerprint") {
-            None if args.road.is_none() && about.text("road.xodr").is_some() => {}
+            None if other_road.is_none() && about.text("road.xodr").is_some() => {}
             None => output::note("the recording cannot tell whether the road is still the same"),
             Some(driven) if driven == found => {}
             Some(driven) => {
@@ -80,17 +83,22 @@ impl Setup {
         Ok(Self { config, policy_file, road: Arc::new(road), limited: None })
     }
 
+    /// The road that was driven.
+    pub(crate) const fn whole_road(&self) -> &Arc<Road> {
+        &self.road
+    }
+
     /// The stack for a truck.
     ///
     /// # Errors
     /// [`Failure::Input`] names the key or file that cannot be used.
-    pub(super) fn stack(&self, limits: &VehicleLimits) -> Result<Stack, Failure> {
+    pub(crate) fn stack(&self, limits: &VehicleLimits) -> Result<Stack, Failure> {
         let policy = self.policy_file.as_deref().map(Path::new);
         sim::stack_of(self.config.clone(), limits, policy).map_err(Failure::input)
     }
 
     /// The road with a limit beside its own ones, m/s.
-    pub(super) fn road(&mut self, cap_m_s: Option<f64>) -> Arc<Road> {
+    pub(crate) fn road(&mut self, cap_m_s: Option<f64>) -> Arc<Road> {
         if cap_m_s != self.limited.as_ref().map(|(cap_m_s, _)| *cap_m_s) {
             self.limited = cap_m_s.map(|cap| (cap, Arc::new(self.road.with_limit_cap(cap))));
         }
@@ -102,7 +110,7 @@ impl Setup {
 ///
 /// # Errors
 /// [`Failure::Input`] if it was not driven over a bus, or by another version.
-pub(super) fn driver_setup(file: &Path, about: &About) -> Result<DriverSetup, Failure> {
+pub(crate) fn driver_setup(file: &Path, about: &About) -> Result<DriverSetup, Failure> {
     let Some(json) = about.driver_json() else {
         let why = "it has no frames of a bus (run --vehicle bus); use --from ego";
         return Err(Failure::file(file, why));

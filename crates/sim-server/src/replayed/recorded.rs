@@ -11,12 +11,12 @@ use tractrix_core::{
 /// It failed in the run as well.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("as recorded")]
-pub(super) struct AsRecorded;
+pub(crate) struct AsRecorded;
 
 /// The truck as the stack saw it in a step.
-pub(super) struct RecordedVehicle<'a> {
-    pub(super) step: &'a GivenStep,
-    pub(super) limits: &'a VehicleLimits,
+pub(crate) struct RecordedVehicle<'a> {
+    pub(crate) step: &'a GivenStep,
+    pub(crate) limits: &'a VehicleLimits,
 }
 
 impl Vehicle for RecordedVehicle<'_> {
@@ -40,7 +40,7 @@ impl Vehicle for RecordedVehicle<'_> {
 }
 
 /// The other vehicles of a step.
-pub(super) struct RecordedTraffic<'a>(pub(super) &'a GivenStep);
+pub(crate) struct RecordedTraffic<'a>(pub(crate) &'a GivenStep);
 
 impl TrafficSource for RecordedTraffic<'_> {
     type Error = AsRecorded;
@@ -52,10 +52,10 @@ impl TrafficSource for RecordedTraffic<'_> {
 
 /// The pose of a step. The ego state has it as it came from its source.
 #[derive(Debug, Default)]
-pub(super) struct RecordedPose(pub(super) Option<Stamped<Pose>>);
+pub(crate) struct RecordedPose(pub(crate) Option<Stamped<Pose>>);
 
 impl RecordedPose {
-    pub(super) fn of(step: &GivenStep) -> Self {
+    pub(crate) fn of(step: &GivenStep) -> Self {
         Self(step.ego.map(|Stamped { time, value }| Stamped { time, value: sim::pose_of(&value) }))
     }
 }
@@ -70,17 +70,17 @@ impl PoseSource for RecordedPose {
 
 /// A bus on which happens what happened in a reading.
 #[derive(Debug, Default)]
-pub(super) struct RecordedBus {
+pub(crate) struct RecordedBus {
     call: BusCall,
     received: usize,
     sent: usize,
     /// The first frame that is sent now and was not then.
-    pub(super) unheard_of: Option<RawFrame>,
+    pub(crate) unheard_of: Option<RawFrame>,
 }
 
 impl RecordedBus {
     /// Goes on with another reading.
-    pub(super) fn begin(&mut self, call: BusCall) {
+    pub(crate) fn begin(&mut self, call: BusCall) {
         *self = Self { call, ..Self::default() };
     }
 }
