@@ -16,6 +16,12 @@ from typing import Any
 import pytest
 import rclpy
 from action_msgs.msg import GoalStatus
+from autoware_vehicle_msgs.msg import (
+    ControlModeReport,
+    GearReport,
+    SteeringReport,
+    VelocityReport,
+)
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
@@ -171,7 +177,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def run(folder: Path) -> Iterator[subprocess.Popen[str]]:
-    options = ["--headless", "--pace", "realtime", "--ros2", "--decider", "external"]
+    options = ["--headless", "--pace", "realtime", "--decider", "external"]
+    options += ["--ros2", "--ros2-names", "autoware"]
     process = program("highway", *options, "--out", str(folder))
     yield process
     process.kill()
@@ -214,6 +221,41 @@ def test_no_tick_is_missing_and_the_others_come_at_their_rates(peer: Peer) -> No
         ("/diagnostics", 100),
     ):
         assert abs(len(peer.heard[name]) - start[name] - passed / every) <= 2, name
+
+
+def test_the_truck_is_seen_under_autowares_names_too(peer: Peer) -> None:
+    names = {
+        "/localization/kinematic_state": Odometry,
+        "/vehicle/status/velocity_status": VelocityReport,
+        "/vehicle/status/steering_status": SteeringReport,
+        "/vehicle/status/gear_status": GearReport,
+        "/vehicle/status/control_mode": ControlModeReport,
+    }
+    heard: dict[str, list[Any]] = {name: [] for name in names}
+    made = [
+        peer.node.create_subscription(kind, name, heard[name].append, RELIABLE)
+        for name, kind in names.items()
+    ]
+    peer.until(lambda: all(len(all_of) > 100 for all_of in heard.values()), "Autoware")
+    for subscription in made:
+        peer.node.destroy_subscription(subscription)
+    odometry, velocity, steering, gear, mode = heard.values()
+    states = {ns(state.header.stamp): state for state in peer.heard["/truck/state"]}
+    places = {ns(odom.header.stamp): odom for odom in peer.heard["/odom"]}
+    assert all(odom == places[ns(odom.header.stamp)] for odom in odometry[:100])
+    for said in velocity[:100]:
+        state = states[ns(said.header.stamp)]
+        assert said.header.frame_id == "base_link"
+        assert said.longitudinal_velocity == pytest.approx(state.speed_m_s, rel=1e-6)
+        assert said.lateral_velocity == pytest.approx(state.lateral_speed_m_s, abs=1e-6)
+        assert said.heading_rate == pytest.approx(state.yaw_rate_rad_s, abs=1e-6)
+    for said in steering[:100]:
+        state = states[ns(said.stamp)]
+        assert said.steering_tire_angle == pytest.approx(state.road_wheel_rad, abs=1e-6)
+    for said in gear[:100]:
+        neutral = states[ns(said.stamp)].gear == 0
+        assert said.report == (GearReport.NEUTRAL if neutral else GearReport.DRIVE)
+    assert {said.mode for said in mode} == {ControlModeReport.AUTONOMOUS}
 
 
 def test_another_nodes_clock_follows_the_run(peer: Peer) -> None:

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use ros2::definitions::{Definition, SIMULATION_INTERFACES, TF2_MSGS};
+use ros2::definitions::{AUTOWARE_VEHICLE_MSGS, Definition, SIMULATION_INTERFACES, TF2_MSGS};
 
 fn main() -> std::io::Result<()> {
     let Some(folder) = std::env::args_os().nth(1) else {
@@ -12,12 +12,10 @@ fn main() -> std::io::Result<()> {
     };
     let folder = Path::new(&folder);
     write(folder, "tf2_msgs", &["geometry_msgs"], TF2_MSGS)?;
-    write(
-        folder,
-        "simulation_interfaces",
-        &["std_msgs", "geometry_msgs", "action_msgs"],
-        SIMULATION_INTERFACES,
-    )
+    let needs = ["builtin_interfaces", "std_msgs"];
+    write(folder, "autoware_vehicle_msgs", &needs, AUTOWARE_VEHICLE_MSGS)?;
+    let needs = ["std_msgs", "geometry_msgs", "action_msgs"];
+    write(folder, "simulation_interfaces", &needs, SIMULATION_INTERFACES)
 }
 
 /// A package as `ament_cmake` builds it.

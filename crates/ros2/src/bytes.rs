@@ -4,7 +4,7 @@ use serde::ser::SerializeTuple;
 use serde::{Serialize, Serializer};
 
 /// Encapsulation header of CDR, bytes (OMG DDSI-RTPS 2.3, 10.5).
-const ENCAPSULATION: usize = 4;
+pub(crate) const ENCAPSULATION: usize = 4;
 
 /// The bytes of a message of [`recording::messages`], sent as they are: bytes need no alignment, so
 /// that an encoder copies them one by one. Its own encapsulation header takes the place of theirs

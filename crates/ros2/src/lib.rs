@@ -2,6 +2,7 @@
 //!
 //! - [`Node`] joins a domain: it publishes every topic of a recording with the recording's own bytes
 //!   ([`Node::listener`]), takes commands, and answers `simulation_interfaces`;
+//! - [`Names`] shows the truck under Autoware's names too;
 //! - [`Simulator`] is the door to whoever runs the simulation;
 //! - [`Network`] says which domain, and who can find the node (this machine unless asked);
 //! - [`definitions`] are the field lists that a peer builds.
@@ -10,6 +11,7 @@
 //! than real time. Nothing here holds the run up. DDS authenticates nobody: whoever reaches the
 //! domain can command the run.
 
+mod autoware;
 mod bytes;
 mod error;
 mod feed;
@@ -20,6 +22,7 @@ mod services;
 mod simulator;
 mod steps;
 
+pub use autoware::Names;
 pub use error::Ros2Error;
 pub use interfaces::definitions;
 pub use network::{Network, Reach};

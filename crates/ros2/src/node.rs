@@ -21,8 +21,10 @@ use ros2_client::{
     ActionTypeName, Context, Message, MessageTypeName, Name, NodeLoggingHandle, NodeName,
     NodeOptions, Publisher, QosProfile, Server, ServiceMapping, ServiceTypeName, Subscription,
 };
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 
+use crate::autoware::{Autoware, Names};
 use crate::bytes::Encoded;
 use crate::error::Ros2Error;
 use crate::feed::{Feed, Outlet, clock_ns, feed};
@@ -56,7 +58,11 @@ impl Node {
     ///
     /// # Errors
     /// [`Ros2Error::ClockTaken`], or what the middleware says.
-    pub fn start(network: Network, simulator: Arc<dyn Simulator>) -> Result<Self, Ros2Error> {
+    pub fn start(
+        network: Network,
+        names: Names,
+        simulator: Arc<dyn Simulator>,
+    ) -> Result<Self, Ros2Error> {
         let participant = network.join()?;
         refuse_second_clock(&participant, network)?;
         let context = Context::from_domain_participant(participant);
@@ -64,6 +70,7 @@ impl Node {
         let mut setup = Setup::new(&context, network)?;
         let log = Arc::new(setup.node.logging_handle());
         let publishers = setup.publishers()?;
+        let autoware = (names == Names::Autoware).then(|| setup.autoware()).transpose()?;
         let loops = setup.loops(&simulator, &log)?;
         let (feed, outlet) = feed(wall_clock());
         let stop = Arc::new(AtomicBool::new(false));
@@ -78,7 +85,7 @@ impl Node {
             spawn(serve),
             spawn({
                 let stop = Arc::clone(&stop);
-                move || publish(&outlet, &publishers, &log, &stop)
+                move || publish(&outlet, &publishers, autoware.as_ref(), &log, &stop)
             }),
         ];
         Ok(Self { feed, stop, stop_services: Some(stop_services), threads })
@@ -154,6 +161,33 @@ impl Setup {
     fn publishers(&mut self) -> Result<Vec<(Topic, Publisher<Encoded>)>, Ros2Error> {
         let topics = TOPICS.into_iter().filter(|t| !t.name.starts_with("/stack/"));
         topics.map(|topic| Ok((topic, self.publisher(&topic)?))).collect()
+    }
+
+    /// Publishers under Autoware's names.
+    fn autoware(&mut self) -> Result<Autoware, Ros2Error> {
+        let status = |kind| ("autoware_vehicle_msgs", kind);
+        let odometry = ("nav_msgs", "Odometry");
+        Ok(Autoware {
+            kinematic_state: self.under("/localization/kinematic_state", odometry)?,
+            velocity: self.under("/vehicle/status/velocity_status", status("VelocityReport"))?,
+            steering: self.under("/vehicle/status/steering_status", status("SteeringReport"))?,
+            gear: self.under("/vehicle/status/gear_status", status("GearReport"))?,
+            control_mode: self
+                .under("/vehicle/status/control_mode", status("ControlModeReport"))?,
+        })
+    }
+
+    fn under<M: Serialize>(
+        &mut self,
+        name: &str,
+        kind: (&str, &str),
+    ) -> Result<Publisher<M>, Ros2Error> {
+        let qos = QosProfile::publisher_default()
+            .reliability_reliable(WhenFull::Fail)
+            .history(History::KeepLast { depth: DEPTH });
+        let made = self.topic(name, kind, &qos)?;
+        let publisher = self.node.create_publisher(&made, None);
+        publisher.map_err(|e| self.network.failure(name, e))
     }
 
     fn publisher(&mut self, topic: &Topic) -> Result<Publisher<Encoded>, Ros2Error> {
@@ -324,6 +358,7 @@ fn say(log: &NodeLoggingHandle, level: LogLevel, text: &str) {
 fn publish(
     outlet: &Outlet,
     publishers: &[(Topic, Publisher<Encoded>)],
+    autoware: Option<&Autoware>,
     log: &NodeLoggingHandle,
     stop: &AtomicBool,
 ) {
@@ -336,6 +371,9 @@ fn publish(
                     say(log, LogLevel::Info, &text);
                 }
                 last_ns = now_ns;
+            }
+            if let Some(autoware) = autoware {
+                autoware.say(&message);
             }
             let to = publishers.iter().find(|(topic, _)| *topic == message.topic);
             if let Some((_, publisher)) = to {

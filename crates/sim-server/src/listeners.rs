@@ -20,6 +20,9 @@ pub(crate) struct Listeners {
 pub(crate) struct Wanted {
     /// A node of a ROS 2 domain.
     pub(crate) ros2: bool,
+    /// Under Autoware's names too.
+    #[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "the node's alone"))]
+    pub(crate) with_autoware: bool,
     /// A server of Foxglove's protocol, on this port.
     pub(crate) foxglove: Option<u16>,
 }
@@ -46,7 +49,7 @@ impl Listeners {
     /// # Errors
     /// [`Failure::Input`]: a ROS domain with a clock already, a port that is taken.
     #[cfg_attr(
-        not(all(feature = "ros2", feature = "foxglove")),
+        not(feature = "foxglove"),
         expect(unused_variables, reason = "each feature uses its own")
     )]
     pub(crate) fn start(
@@ -56,7 +59,10 @@ impl Listeners {
     ) -> Result<Self, Failure> {
         Ok(Self {
             #[cfg(feature = "ros2")]
-            ros2: wanted.ros2.then(|| crate::ros2_node::start(session)).transpose()?,
+            ros2: wanted
+                .ros2
+                .then(|| crate::ros2_node::start(session, wanted.with_autoware))
+                .transpose()?,
             #[cfg(feature = "foxglove")]
             foxglove: wanted
                 .foxglove

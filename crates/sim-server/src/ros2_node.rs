@@ -5,7 +5,9 @@ use std::sync::Arc;
 use futures::FutureExt;
 use futures::future::BoxFuture;
 use planner::decider::LaneChoice;
-use ros2::{Direction, Entities, Entity, Network, Node, Request, Simulator, World, WorldSource};
+use ros2::{
+    Direction, Entities, Entity, Names, Network, Node, Request, Simulator, World, WorldSource,
+};
 use sim::Scenario;
 use tractrix_core::{EgoState, Neighbour};
 
@@ -17,10 +19,11 @@ use crate::session::{Command, Handle, Refused, State};
 /// # Errors
 /// [`Failure::Input`]: an environment variable, or a domain with a clock already.
 #[expect(clippy::disallowed_methods, reason = "ROS 2 is configured by the environment")]
-pub(crate) fn start(handle: &Handle) -> Result<Node, Failure> {
+pub(crate) fn start(handle: &Handle, with_autoware: bool) -> Result<Node, Failure> {
     let network = Network::from_environment(|name| std::env::var(name).ok());
     let network = network.map_err(Failure::input)?;
-    Node::start(network, Arc::new(Session(handle.clone()))).map_err(Failure::input)
+    let names = if with_autoware { Names::Autoware } else { Names::Own };
+    Node::start(network, names, Arc::new(Session(handle.clone()))).map_err(Failure::input)
 }
 
 /// A session's door with the words of ROS 2.

@@ -100,6 +100,25 @@ pub const SIMULATION_INTERFACES: &[Definition] = &[
     ),
 ];
 
+/// Package `autoware_vehicle_msgs`: what this node says under Autoware's names.
+pub const AUTOWARE_VEHICLE_MSGS: &[Definition] = &[
+    (
+        "msg/VelocityReport.msg",
+        "std_msgs/Header header\nfloat32 longitudinal_velocity\nfloat32 lateral_velocity\n\
+         float32 heading_rate\n",
+    ),
+    ("msg/SteeringReport.msg", "builtin_interfaces/Time stamp\nfloat32 steering_tire_angle\n"),
+    (
+        "msg/GearReport.msg",
+        "uint8 NONE=0\nuint8 NEUTRAL=1\nuint8 DRIVE=2\nbuiltin_interfaces/Time stamp\nuint8 report\n",
+    ),
+    (
+        "msg/ControlModeReport.msg",
+        "uint8 NO_COMMAND=0\nuint8 AUTONOMOUS=1\nuint8 MANUAL=4\n\
+         builtin_interfaces/Time stamp\nuint8 mode\n",
+    ),
+];
+
 /// Package `tf2_msgs`.
 pub const TF2_MSGS: &[Definition] =
     &[("msg/TFMessage.msg", "geometry_msgs/TransformStamped[] transforms\n")];

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::Parser;
 use clap::builder::RangedU64ValueParser;
+use clap::{Parser, ValueEnum};
 
 use crate::cli::positive;
 use crate::dashboard::AccessArgs;
@@ -90,11 +90,22 @@ pub(crate) struct Args {
     /// this machine alone unless ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET. Nobody is authenticated.
     #[arg(long)]
     ros2: bool,
+    /// Names of its topics: tractrix, or autoware for those of Autoware too
+    /// (/localization/kinematic_state, /vehicle/status/...).
+    #[arg(long, value_name = "NAMES", requires = "ros2", hide_possible_values = true)]
+    ros2_names: Option<Names>,
     /// Shows the run to Foxglove and Lichtblick, and takes commands from them, on this port of
     /// 127.0.0.1 (0: a free one). Nobody is authenticated, and any page in a browser on this
     /// machine can reach it. Needs a program that is built with `--features foxglove`.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     foxglove: Option<u16>,
+}
+
+/// Whose names the ROS 2 node has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Names {
+    Tractrix,
+    Autoware,
 }
 
 /// A way to the truck.

@@ -2,7 +2,7 @@
 
 use sim::{Overrides, Scenario};
 
-use super::Args;
+use super::{Args, Names};
 use crate::failure::Failure;
 use crate::listeners::Wanted;
 
@@ -32,5 +32,6 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
 
 /// The networks that the run is to be shown on.
 pub(super) const fn networks(args: &Args) -> Wanted {
-    Wanted { ros2: args.ros2, foxglove: args.foxglove }
+    let with_autoware = matches!(args.ros2_names, Some(Names::Autoware));
+    Wanted { ros2: args.ros2, with_autoware, foxglove: args.foxglove }
 }
