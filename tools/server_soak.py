@@ -143,7 +143,9 @@ def metrics(url: str) -> dict[str, float]:
     """The counters of the server."""
     with urllib.request.urlopen(f"{url}/api/v1/metrics", timeout=10) as answer:
         text = answer.read().decode()
-    found = re.findall(r"^tractrix_(\w+) (\S+)$", text, re.MULTILINE)
+    found = re.findall(
+        r'^tractrix_(\w+)\{session="default"\} (\S+)$', text, re.MULTILINE
+    )
     return {name: float(value) for name, value in found}
 
 

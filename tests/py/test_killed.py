@@ -25,7 +25,9 @@ def ticks_driven(url: str) -> int:
     """The ticks of the run so far, from its metrics."""
     with urllib.request.urlopen(f"{url}/api/v1/metrics", timeout=10) as answer:
         found = re.search(
-            r"^tractrix_ticks_total (\d+)", answer.read().decode(), re.MULTILINE
+            r'^tractrix_ticks_total\{session="default"\} (\d+)',
+            answer.read().decode(),
+            re.MULTILINE,
         )
     assert found is not None
     return int(found.group(1))
