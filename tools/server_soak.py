@@ -102,6 +102,7 @@ async def look(url: str, seen: Seen, pause_s: float) -> None:
                 max_queue=1,
                 max_size=None,
                 compression=None,
+                ping_interval=None,
             ) as viewer:
                 seen.connections += 1
                 async for text in viewer:
