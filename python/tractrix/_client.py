@@ -325,6 +325,18 @@ class Session:
         """In a pause: drives to the first tick at or behind a simulation time, s."""
         return self._control(action="step_until", time_s=time_s, wait=wait)
 
+    def pause_at(self, time_s: float) -> Acted:
+        """Stands still at the first tick at or behind a simulation time, s, when it comes there."""
+        return self._control(action="pause_at", time_s=time_s)
+
+    def snapshot(self, name: str) -> Acted:
+        """Keeps the world as it is now, under a name (lower-case letters, digits, hyphens)."""
+        return self._control(action="snapshot", name=name)
+
+    def restore(self, name: str) -> Acted:
+        """Goes on from where the world was kept, with a recording of its own."""
+        return self._control(action="restore", name=name)
+
     def reset(self, seed: int | None = None) -> Acted:
         """Back to the start, with a recording of its own; with the same seed or another one."""
         more = {} if seed is None else {"seed": seed}

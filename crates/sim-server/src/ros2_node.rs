@@ -108,6 +108,8 @@ fn refused(why: &Refused) -> ros2::Refused {
         | Refused::OneSumo
         | Refused::SecondSumo => ros2::Refused::Unsupported(text),
         Refused::TooMany
+        | Refused::NothingKept(_)
+        | Refused::TooManyKept
         | Refused::CutShort { .. }
         | Refused::TooFar { .. }
         | Refused::Unusable(_) => ros2::Refused::Failed(text),

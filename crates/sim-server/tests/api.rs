@@ -330,6 +330,65 @@ fn a_run_in_lockstep_has_the_bits_of_the_same_run_alone() {
     assert_eq!(summary["state_hash"], alone.summary().state_hash.as_str());
 }
 
+/// What-if: the same moment goes on twice, and once otherwise; each has a recording of its own.
+#[test]
+fn a_world_that_was_kept_goes_on_with_the_bits_that_it_would_have_had() {
+    let run = Run::start(&["--pace", "max", "--seed", "5"]);
+    run.act(r#"{"action": "pause"}"#);
+    run.act(r#"{"action": "reset"}"#);
+    let step =
+        |ticks: u32| run.act(&format!(r#"{{"action": "step", "ticks": {ticks}, "wait": true}}"#));
+    step(500);
+    run.act(r#"{"action": "snapshot", "name": "here"}"#);
+    step(400);
+    let back = run.act(r#"{"action": "restore", "name": "here"}"#);
+    assert_eq!((&back["time_s"], &back["state"]), (&5.0.into(), &"paused".into()), "{back}");
+    assert_eq!(step(400)["time_s"], 9.0);
+    run.act(r#"{"action": "restore", "name": "here"}"#);
+    run.act(r#"{"action": "set_speed", "speed_m_s": 12}"#);
+    step(400);
+    let unknown = run.control(r#"{"action": "restore", "name": "there"}"#);
+    refused(&unknown, 409, "nothing_kept", "\"there\"");
+    for number in 1..8 {
+        run.act(&format!(r#"{{"action": "snapshot", "name": "more-{number}"}}"#));
+    }
+    let more = run.control(r#"{"action": "snapshot", "name": "more-8"}"#);
+    refused(&more, 409, "too_many_kept", "8 worlds");
+    run.act(r#"{"action": "snapshot", "name": "here"}"#);
+    run.act(r#"{"action": "quit"}"#);
+    let out = run.folder.path().join("out");
+    let replayed = program().arg("process-replay").arg(out.join("run-3/run.mcap")).output();
+    let line = String::from_utf8(replayed.unwrap().stderr).unwrap();
+    assert!(line.contains("goes on from a snapshot at 5 s"), "{line}");
+    let summary = |name: &str| -> Value {
+        serde_json::from_slice(&std::fs::read(out.join(name).join("summary.json")).unwrap())
+            .unwrap()
+    };
+    let (whole, again) = (summary("run-2"), summary("run-3"));
+    assert_eq!(whole["state_hash"], again["state_hash"]);
+    assert_eq!(whole["fuel_g"], again["fuel_g"]);
+    assert_eq!(whole["ghost"], again["ghost"], "its ghost goes on as well");
+    assert_ne!(run.end("run-4/summary.json")["state_hash"], whole["state_hash"]);
+}
+
+#[test]
+fn a_run_stands_still_where_it_was_told_to() {
+    let run = Run::start(&["--pace", "max"]);
+    run.act(r#"{"action": "pause"}"#);
+    run.act(r#"{"action": "reset"}"#);
+    run.act(r#"{"action": "pause_at", "time_s": 4.5}"#);
+    run.act(r#"{"action": "play"}"#);
+    let stands = (0..600).any(|_| {
+        std::thread::sleep(Duration::from_millis(20));
+        run.ask("GET", "/api/v1/sessions/default", "", b"").1["state"] == "paused"
+    });
+    assert!(stands);
+    assert_eq!(run.act(r#"{"action": "pause"}"#)["tick"], 450);
+    run.act(r#"{"action": "play"}"#);
+    std::thread::sleep(Duration::from_millis(200));
+    assert!(run.act(r#"{"action": "pause"}"#)["tick"].as_u64().unwrap() > 450, "once");
+}
+
 #[test]
 fn commands_in_a_wrong_state_are_refused_with_what_they_need() {
     let run = Run::start(&["--duration", "3", "--pace", "max"]);

@@ -95,6 +95,10 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
 fn replay(args: &Args, stages: &Stages) -> Result<(Provenance, Comparison), Failure> {
     let mut inputs = Inputs::open(&args.file, args.from == From::Frames)?;
     let about = inputs.about().clone();
+    if let Some(time_s) = about.value("run", "continues_at_s") {
+        let why = format!("it goes on from a snapshot at {time_s} s: its stack was not new then");
+        return Err(Failure::file(&args.file, why));
+    }
     let mut setup = Setup::new(&args.file, &about, &args.set, args.road.as_deref())?;
     let seed = about.value("run", "seed").and_then(|seed| seed.parse().ok());
     let mut comparison = Comparison::default();

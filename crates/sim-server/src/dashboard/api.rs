@@ -11,6 +11,7 @@ use axum::response::{IntoResponse, Response};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use tokio::task::JoinError;
 use utoipa::IntoParams;
 
 use super::hub::{Hub, Of};
@@ -173,6 +174,10 @@ pub(crate) async fn carry_out(handle: Handle, wish: Wish) -> Result<Acted, Refus
     let command = match wish {
         Wish::Command(command) => command,
         Wish::Reset { seed } => restart(handle.clone(), seed, None).await?,
+        Wish::Restore(name) => {
+            let handle = handle.clone();
+            built(tokio::task::spawn_blocking(move || handle.restore(&name)).await)?
+        }
         Wish::Stop => restart(handle.clone(), None, Some(session::State::Stopped)).await?,
     };
     handle.ask(command).await
@@ -184,6 +189,9 @@ async fn restart(
     seed: Option<u64>,
     state: Option<session::State>,
 ) -> Result<Command, Refused> {
-    let built = tokio::task::spawn_blocking(move || handle.reset(seed, state)).await;
-    built.unwrap_or_else(|e| Err(Refused::Unusable(e.to_string())))
+    built(tokio::task::spawn_blocking(move || handle.reset(seed, state)).await)
+}
+
+fn built(done: Result<Result<Command, Refused>, JoinError>) -> Result<Command, Refused> {
+    done.unwrap_or_else(|e| Err(Refused::Unusable(e.to_string())))
 }

@@ -177,6 +177,21 @@ pub(super) enum CommandObject {
         #[schema(nullable = false)]
         wait: Option<bool>,
     },
+    /// Stands still at the first tick at or behind a simulation time, s, when it comes there.
+    PauseAt {
+        #[schema(minimum = 0)]
+        time_s: f64,
+    },
+    /// Keeps the world as it is now, under a name.
+    Snapshot {
+        #[schema(pattern = "^[a-z0-9-]{1,40}$")]
+        name: String,
+    },
+    /// Goes on from where the world was kept, with a recording of its own.
+    Restore {
+        #[schema(pattern = "^[a-z0-9-]{1,40}$")]
+        name: String,
+    },
     /// Back to the start, with a recording of its own.
     Reset {
         #[schema(minimum = 0, maximum = 18_446_744_073_709_551_615_u64, nullable = false)]

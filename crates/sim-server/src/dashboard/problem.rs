@@ -189,6 +189,8 @@ const fn code_of(why: &Refused) -> (StatusCode, &'static str) {
         Refused::NoExternalDecider => (StatusCode::CONFLICT, "no_external_decider"),
         Refused::OutsideBus(_) => (StatusCode::CONFLICT, "outside_bus"),
         Refused::OneSumo | Refused::SecondSumo => (StatusCode::CONFLICT, "one_sumo"),
+        Refused::NothingKept(_) => (StatusCode::CONFLICT, "nothing_kept"),
+        Refused::TooManyKept => (StatusCode::CONFLICT, "too_many_kept"),
         Refused::CutShort { .. } => (StatusCode::CONFLICT, "cut_short"),
         Refused::TooFar { .. } => (StatusCode::UNPROCESSABLE_ENTITY, "too_far"),
         Refused::Unusable(_) => (StatusCode::UNPROCESSABLE_ENTITY, "unusable"),

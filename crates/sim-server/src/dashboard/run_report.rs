@@ -43,7 +43,9 @@ fn sentence(run: &FoundRun, playback: &Playback) -> String {
     };
     let differs = match playback.ticks_different {
         0 => String::new(),
-        ticks => format!(" {ticks} commands do not come out as recorded: another revision drove."),
+        ticks => format!(
+            " {ticks} commands do not come out as recorded: another revision drove, or it goes on from a snapshot."
+        ),
     };
     format!(
         "Scenario {}, seed {seed}, revision {}, state hash {}, end: {}. {figures}.{differs}",

@@ -25,6 +25,10 @@ pub(crate) enum Command {
         /// As with [`Self::Step`].
         wait: bool,
     },
+    /// Stands still at the first tick at or behind a simulation time, s, when it comes there.
+    PauseAt(f64),
+    /// Keeps the world as it is now, under a name.
+    Snapshot(String),
     /// Changes the pace.
     Pace(Pace),
     /// Wishes a lane change (decider `external`); the safety gate decides.
@@ -52,6 +56,8 @@ pub(crate) enum Wish {
     },
     /// Back to the start, standing still.
     Stop,
+    /// Back to where the world was kept under this name.
+    Restore(String),
 }
 
 /// Ticks of one command, at most.
@@ -63,8 +69,8 @@ pub(crate) enum CommandError {
     #[error("the body is not a JSON object like {{\"action\": \"pause\"}}")]
     NotAnObject,
     #[error(
-        "unknown action {0}; there are play, pause, step, step_until, reset, stop, pace, \
-         lane_change, set_speed and quit"
+        "unknown action {0}; there are play, pause, step, step_until, pause_at, reset, stop, \
+         snapshot, restore, pace, lane_change, set_speed and quit"
     )]
     UnknownAction(String),
     #[error("{action} needs {key}: {values}")]
@@ -110,11 +116,17 @@ impl Wish {
                 Self::Command(Command::Step { ticks, wait: take_wait(&mut keys)? })
             }
             Some("step_until") => {
-                let values = "a simulation time in seconds, zero or more";
-                let time_s = |v: &Value| v.as_f64().filter(|t| *t >= 0.0 && t.is_finite());
-                let time_s = take(&mut keys, "step_until", "time_s", values, time_s)?;
+                let time_s = take(&mut keys, "step_until", "time_s", TIMES, time)?;
                 Self::Command(Command::StepUntil { time_s, wait: take_wait(&mut keys)? })
             }
+            Some("pause_at") => {
+                let time_s = take(&mut keys, "pause_at", "time_s", TIMES, time)?;
+                Self::Command(Command::PauseAt(time_s))
+            }
+            Some("snapshot") => {
+                Self::Command(Command::Snapshot(take(&mut keys, "snapshot", "name", NAMES, name)?))
+            }
+            Some("restore") => Self::Restore(take(&mut keys, "restore", "name", NAMES, name)?),
             Some("reset") => {
                 let seed = take_optional(&mut keys, "seed", SEEDS, Value::as_u64)?;
                 Self::Reset { seed }
@@ -142,6 +154,19 @@ impl Wish {
             None => Ok(wish),
         }
     }
+}
+
+const TIMES: &str = "a simulation time in seconds, zero or more";
+const NAMES: &str = "a name of 1 to 40 lower-case letters, digits and hyphens";
+
+fn time(value: &Value) -> Option<f64> {
+    value.as_f64().filter(|t| *t >= 0.0 && t.is_finite())
+}
+
+fn name(value: &Value) -> Option<String> {
+    let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
+    let fits = |name: &&str| (1..=40).contains(&name.len()) && name.chars().all(plain);
+    value.as_str().filter(fits).map(str::to_owned)
 }
 
 const SEEDS: &str = "a whole number from 0 to 18446744073709551615";
@@ -190,7 +215,16 @@ mod tests {
         use Command as C;
         type Is = fn(&Wish) -> bool;
         use Wish as W;
-        let cases: [(&str, Is); 14] = [
+        let cases: [(&str, Is); 17] = [
+            (r#"{"action":"pause_at","time_s":4}"#, |c| matches!(c, W::Command(C::PauseAt(4.0)))),
+            (
+                r#"{"action":"snapshot","name":"a-1"}"#,
+                |c| matches!(c, W::Command(C::Snapshot(name)) if name == "a-1"),
+            ),
+            (
+                r#"{"action":"restore","name":"a-1"}"#,
+                |c| matches!(c, W::Restore(name) if name == "a-1"),
+            ),
             (r#"{"action":"play"}"#, |c| matches!(c, W::Command(C::Play))),
             (r#"{"action":"pause"}"#, |c| matches!(c, W::Command(C::Pause))),
             (r#"{"action":"stop"}"#, |c| matches!(c, W::Stop)),
@@ -242,6 +276,8 @@ mod tests {
             (r#"{"action":"step","ticks":1,"wait":1}"#, "wrong_value", "wait = 1"),
             (r#"{"action":"step_until","time_s":-1}"#, "wrong_value", "time_s = -1"),
             (r#"{"action":"reset","seed":18446744073709551616}"#, "wrong_value", "seed = "),
+            (r#"{"action":"snapshot","name":"../a"}"#, "wrong_value", "lower-case letters"),
+            (r#"{"action":"restore"}"#, "missing_key", "restore needs name"),
             (r#"{"action":"set_speed","speed_m_s":41}"#, "wrong_value", "0 to 40"),
             (r#"{"action":"pace","pace":"NaN"}"#, "wrong_value", "realtime, max or a factor"),
             (r#"{"action":"pace","pace":0}"#, "wrong_value", "pace = 0"),

@@ -9,7 +9,7 @@ use planner::decider::DeciderKind;
 use recording::Recording;
 use sim::{EndReason, Status, TickTime, TickTimes, World};
 use tokio::sync::oneshot;
-use tractrix_core::{Recorder, Step, Tick};
+use tractrix_core::{Recorder, Step, Tick, Time};
 
 use super::pace::Pacer;
 use super::{Acted, Asked, Command, Handle, Next, Pace, Refused, RunState, State};
@@ -56,6 +56,9 @@ pub(crate) type Reply = oneshot::Sender<Result<Acted, Refused>>;
 /// Viewers get a frame this often (wall time).
 const FRAME_PERIOD: Duration = Duration::from_millis(50);
 
+/// A time is reached when it is nearer than this, s.
+const ROUNDING_S: f64 = 1e-6;
+
 /// Who looks at a tick.
 struct Views<'a> {
     publisher: Option<&'a mut Publisher>,
@@ -100,6 +103,8 @@ pub(crate) struct Drive {
     steps: u64,
     /// Who waits for that pause.
     waiting: Option<Reply>,
+    /// The run stands still when this simulation time is reached, s.
+    pause_at_s: Option<f64>,
     frame_due: Duration,
     next: Option<(Box<Next>, Reply)>,
     quits: bool,
@@ -116,6 +121,7 @@ impl Drive {
             tick: 0,
             steps: 0,
             waiting: None,
+            pause_at_s: None,
             frame_due: Duration::ZERO,
             next: None,
             quits: false,
@@ -126,7 +132,10 @@ impl Drive {
     /// Drives the world to its end, until it is stopped or replaced, or until it or the recording
     /// fails.
     pub(crate) fn run(mut self) -> Ended {
-        let mut failure = self.job.world.attach_ghost().map_err(Failure::work).err();
+        // A world that goes on from where it was kept has its ghost
+        let begins = self.job.world.now() == Time::default();
+        let mut failure =
+            if begins { self.job.world.attach_ghost().map_err(Failure::work).err() } else { None };
         self.enter(self.job.state);
         if failure.is_none() {
             self.show_start();
@@ -229,6 +238,13 @@ impl Drive {
         if self.steps == 0 {
             self.answer_waiting();
         }
+        let now_s = self.job.world.now().seconds();
+        if self.job.state == State::Playing
+            && self.pause_at_s.is_some_and(|at_s| now_s + ROUNDING_S >= at_s)
+        {
+            self.pause_at_s = None;
+            self.pause();
+        }
         if self.job.recording.is_broken() {
             return Err(Failure::Work("the recording cannot go on".to_owned()));
         }
@@ -293,6 +309,11 @@ impl Drive {
                 // A time that has passed is reached already
                 return self.step("step_until", ticks.max(0.0) as u64, wait, reply);
             }
+            Command::PauseAt(time_s) => {
+                self.pause_at_s = Some(time_s);
+                Ok(())
+            }
+            Command::Snapshot(name) => self.job.handle.keep(name, &self.job.world),
             Command::Pace(pace) => {
                 self.pacer.restart(pace, now);
                 Ok(())

@@ -1,5 +1,6 @@
 //! The door to a session: commands in, answers out, and what can be seen without asking.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -59,12 +60,16 @@ pub(crate) enum Refused {
     WrongState { action: &'static str, state: State, needs: &'static str },
     #[error("the run decides on lane changes itself; start it with --decider external")]
     NoExternalDecider,
-    #[error("the truck behind {0} cannot be put back to its start")]
+    #[error("the truck behind {0} cannot be put back to where it was")]
     OutsideBus(String),
-    #[error("SUMO drives the traffic: its run cannot be reset, nor another one begun")]
+    #[error("SUMO drives the traffic: its run cannot be reset or kept, nor another one begun")]
     OneSumo,
     #[error("SUMO drives the traffic of another session: there is one at a time")]
     SecondSumo,
+    #[error("nothing was kept under the name {0:?}")]
+    NothingKept(String),
+    #[error("{MAX_KEPT} worlds are kept already; one of their names can be used again")]
+    TooManyKept,
     #[error("cut short: {left} ticks were not driven")]
     CutShort { left: u64 },
     #[error("{ticks} ticks away: a step is at most {}", super::command::MAX_TICKS)]
@@ -108,7 +113,12 @@ struct View {
     folder: Option<PathBuf>,
     /// It is being written.
     is_recording: bool,
+    /// Worlds as they were, with their seeds.
+    kept: BTreeMap<String, (World, u64)>,
 }
+
+/// Worlds that a session keeps, at most.
+const MAX_KEPT: usize = 8;
 
 /// The door to a session.
 #[derive(Clone)]
@@ -127,9 +137,16 @@ pub(crate) fn channel(
 ) -> (Handle, Receiver<Asked>) {
     let (queue, asked) = sync_channel(QUEUE);
     let scenario = Arc::new(scenario.clone());
-    let bodies = Bodies::default();
-    let view =
-        View { state: State::Stopped, scenario, seed, bodies, folder: None, is_recording: false };
+    let (bodies, kept) = (Bodies::default(), BTreeMap::new());
+    let view = View {
+        state: State::Stopped,
+        scenario,
+        seed,
+        bodies,
+        folder: None,
+        is_recording: false,
+        kept,
+    };
     let outside_bus = outside_bus.map(Arc::from);
     (Handle { queue, view: Arc::new(Mutex::new(view)), outside_bus }, asked)
 }
@@ -164,6 +181,34 @@ impl Handle {
             (Arc::clone(&view.scenario), view.seed, view.state)
         };
         self.begin(&scenario, seed.unwrap_or(same), state.unwrap_or(now))
+    }
+
+    /// The command that goes on from where the world was kept, with a recording of its own.
+    ///
+    /// # Errors
+    /// [`Refused::NothingKept`].
+    pub(crate) fn restore(&self, name: &str) -> Result<Command, Refused> {
+        let view = self.view();
+        let kept = view.kept.get(name).ok_or_else(|| Refused::NothingKept(name.to_owned()))?;
+        let (world, seed) = kept.clone();
+        Ok(Command::Begin(Box::new(Next { world, seed, state: view.state })))
+    }
+
+    /// Keeps a world.
+    pub(super) fn keep(&self, name: String, world: &World) -> Result<(), Refused> {
+        if let Some(bus) = &self.outside_bus {
+            return Err(Refused::OutsideBus(bus.to_string()));
+        }
+        if world.scenario().traffic.source == TrafficKind::Sumo {
+            return Err(Refused::OneSumo);
+        }
+        let mut view = self.view();
+        if view.kept.len() >= MAX_KEPT && !view.kept.contains_key(&name) {
+            return Err(Refused::TooManyKept);
+        }
+        let seed = view.seed;
+        view.kept.insert(name, (world.clone(), seed));
+        Ok(())
     }
 
     /// The command that begins another scenario. As [`Self::reset`].

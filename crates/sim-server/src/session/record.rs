@@ -39,7 +39,7 @@ pub(super) fn start_recording(
     listener: Option<Listener>,
 ) -> Result<Recording, Failure> {
     let scenario = world.scenario();
-    let metadata = BTreeMap::from([
+    let mut metadata = BTreeMap::from([
         ("schema".to_owned(), "1".to_owned()),
         ("seed".to_owned(), seed.to_string()),
         ("version".to_owned(), VERSION.to_owned()),
@@ -49,6 +49,11 @@ pub(super) fn start_recording(
         ("road_fingerprint".to_owned(), sim::road_fingerprint(world.road())),
         ("started_unix_s".to_owned(), format!("{:.3}", started.as_secs_f64())),
     ]);
+    let begins_s = world.now().seconds();
+    if begins_s > 0.0 {
+        // Its stack was not new at the first tick
+        metadata.insert("continues_at_s".to_owned(), begins_s.to_string());
+    }
     let files = BTreeMap::from([
         ("scenario.toml", toml::to_string(scenario).map_err(Failure::work)?),
         ("stack.toml", toml::to_string(world.stack().config()).map_err(Failure::work)?),

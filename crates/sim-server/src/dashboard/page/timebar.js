@@ -10,7 +10,7 @@ export async function startTimeBar(recorded) {
   const at = $("at");
   Object.assign(at, { min: first, max: last });
   $("timebar").hidden = false;
-  if (recorded.different > 0) $("differs").textContent = `${recorded.different} commands do not come out as recorded: another revision drove`;
+  if (recorded.different > 0) $("differs").textContent = `${recorded.different} commands do not come out as recorded: another revision drove, or it goes on from a snapshot`;
   const show = () => {
     at.value = recorded.time_s;
     $("at-s").textContent = `${clock(recorded.time_s)} of ${clock(last)}`;
