@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::Stdio;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 
 use serde::Serialize;
@@ -24,6 +24,10 @@ const MOST: usize = 32;
 const AT_ONCE: usize = 1;
 /// A job that takes longer is ended.
 const LONGEST: Duration = Duration::from_secs(1800);
+/// Jobs that are ended with the server have this time to go,
+const LONGEST_END: Duration = Duration::from_secs(5);
+/// and are looked for this often.
+const LOOK: Duration = Duration::from_millis(10);
 /// Longest line of a command that is kept, bytes.
 const MAX_LINE_BYTES: u64 = 4_096;
 
@@ -167,6 +171,23 @@ impl Jobs {
         let Some(job) = found.and_then(|number| all.jobs.remove(&number)) else { return false };
         job.cancel.notify_one();
         true
+    }
+
+    /// Ends all jobs, and removes their files; those under way get a moment to go.
+    pub(crate) async fn end(&self) {
+        let jobs = std::mem::take(&mut self.lock().jobs);
+        for job in jobs.values() {
+            job.cancel.notify_one();
+        }
+        let all: Vec<Weak<Job>> = jobs.values().map(Arc::downgrade).collect();
+        drop(jobs);
+        let gone = async {
+            while all.iter().any(|job| job.strong_count() > 0) {
+                tokio::time::sleep(LOOK).await;
+            }
+        };
+        // Who still looks at a file keeps it a little longer
+        let _ = tokio::time::timeout(LONGEST_END, gone).await;
     }
 
     fn lock(&self) -> MutexGuard<'_, Kept> {

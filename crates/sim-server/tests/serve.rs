@@ -26,7 +26,9 @@ struct Server {
 impl Server {
     fn start(options: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("tmp")).unwrap();
         let mut process = program()
+            .env("TMPDIR", folder.path().join("tmp"))
             .args(["serve", "--port", "0", "--runs"])
             .arg(folder.path().join("runs"))
             .args(options)
@@ -296,10 +298,10 @@ fn the_finished_part_of_a_run_under_way_is_a_whole_recording() {
     assert!(compared["ticks_compared"].as_u64().unwrap() >= 800, "{compared}");
 }
 
-/// `plan` over HTTP is `plan`: the same file.
+/// `plan` over HTTP is `plan`: the same file. Its folder goes with the server, a job under way too.
 #[test]
 fn a_job_leaves_what_the_command_would() {
-    let server = Server::start(&[]);
+    let mut server = Server::start(&[]);
     let trip = json!({
         "truck": "sinotruk", "road": "builtin:flat", "mass_kg": 20000, "set_speed_m_s": 22,
         "speed_min_m_s": 20, "speed_max_m_s": 24,
@@ -333,6 +335,11 @@ fn a_job_leaves_what_the_command_would() {
     refusal(&diagnose(json!({ "truck": "sinotruk", "run": "x" })), 404, "no_run", "x");
     refusal(&diagnose(json!({ "truck": "/etc/passwd", "drives": "d" })), 422, "outside", "truck");
     refusal(&diagnose(json!({ "truck": "sinotruk", "drives": "/etc" })), 422, "outside", "drives");
+    server.ask("POST", "/api/v1/plan", &trip);
+    let folders = || std::fs::read_dir(server.folder.path().join("tmp")).unwrap().count();
+    assert!(folders() >= 2);
+    assert_eq!(server.end(), Some(0));
+    assert_eq!(std::fs::read_dir(server.folder.path().join("tmp")).unwrap().count(), 0);
 }
 
 #[test]

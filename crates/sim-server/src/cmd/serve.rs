@@ -1,6 +1,7 @@
 //! `serve`: the server without a run; sessions are asked for over HTTP.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Duration;
 
 use clap::Parser;
@@ -58,7 +59,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         args.assets.clone(),
         access,
     );
-    runtime.spawn(Dashboard::new(listener, hub).serve());
+    runtime.spawn(Dashboard::new(listener, Arc::clone(&hub)).serve());
     output::note(&format!("serving: http://{address}  (Ctrl-C ends it)"));
     runtime.block_on(async {
         crate::signals::stop_signal().await;
@@ -72,6 +73,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             _ = tokio::time::timeout(LONGEST_END, ended) => {}
             _ = crate::signals::stop_signal() => {}
         }
+        hub.end().await;
     });
     runtime.shutdown_background();
     match sessions.count() {

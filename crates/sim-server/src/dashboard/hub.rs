@@ -62,6 +62,11 @@ impl Hub {
         })
     }
 
+    /// Ends what would outlive the server.
+    pub(crate) async fn end(&self) {
+        self.jobs.end().await;
+    }
+
     /// Whether a session is recording this run now.
     pub(super) fn is_recording(&self, run: &FoundRun) -> bool {
         self.sessions.all().iter().any(|session| {

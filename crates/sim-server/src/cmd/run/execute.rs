@@ -58,7 +58,7 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     };
     let first = Begin { world, seed, state: State::Playing, out, waiting: None };
     let first = runs.prepare(first, asked)?;
-    if let Some(listener) = listener {
+    let hub = if let Some(listener) = listener {
         let address = listener.local_addr().map_err(Failure::work)?;
         output::note(&format!("dashboard: http://{address}  (Ctrl-C ends the run)"));
         let folder = match &args.out {
@@ -66,13 +66,19 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
             None => RunFolder::Of("runs".into()),
         };
         let hub = Hub::new(sessions, metrics, folder, None, access);
-        runtime.spawn(Dashboard::new(listener, hub).serve());
-    }
+        runtime.spawn(Dashboard::new(listener, Arc::clone(&hub)).serve());
+        Some(hub)
+    } else {
+        None
+    };
     let ended = runs.drive_all(first);
     if !args.headless || args.foxglove.is_some() {
         runtime.block_on(async { tokio::time::sleep(LAST_FRAME_TIME).await });
     }
     drop(claim);
+    if let Some(hub) = hub {
+        runtime.block_on(hub.end());
+    }
     runtime.shutdown_background();
     let (summary, json, folder) = ended?;
     super::report::report(args.json, &summary, &json, &folder)
