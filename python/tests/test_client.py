@@ -85,7 +85,15 @@ def test_a_run_in_lockstep_has_the_bits_of_a_world_in_this_process(
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tractrix.Client]:
     runs = tmp_path_factory.mktemp("serve") / "runs"
-    words: list[str | Path] = ["serve", "--port", "0", "--sessions", "2", "--runs", runs]
+    words: list[str | Path] = [
+        "serve",
+        "--port",
+        "0",
+        "--sessions",
+        "2",
+        "--runs",
+        runs,
+    ]
     with subprocess.Popen(
         [program(), *words], stderr=subprocess.PIPE, text=True
     ) as process:

@@ -171,7 +171,16 @@ pub(super) const LONGEST_WAIT: Duration = Duration::from_secs(600);
 /// # Errors
 /// [`Refused`].
 pub(crate) async fn carry_out(handle: Handle, wish: Wish) -> Result<Acted, Refused> {
-    let command = match wish {
+    let command = command_of(&handle, wish).await?;
+    handle.ask(command).await
+}
+
+/// The command that carries out what was asked for; another world is built first.
+///
+/// # Errors
+/// [`Refused`].
+pub(super) async fn command_of(handle: &Handle, wish: Wish) -> Result<Command, Refused> {
+    Ok(match wish {
         Wish::Command(command) => command,
         Wish::Reset { seed } => restart(handle.clone(), seed, None).await?,
         Wish::Restore(name) => {
@@ -179,8 +188,7 @@ pub(crate) async fn carry_out(handle: Handle, wish: Wish) -> Result<Acted, Refus
             built(tokio::task::spawn_blocking(move || handle.restore(&name)).await)?
         }
         Wish::Stop => restart(handle.clone(), None, Some(session::State::Stopped)).await?,
-    };
-    handle.ask(command).await
+    })
 }
 
 /// A world is built where nobody waits.

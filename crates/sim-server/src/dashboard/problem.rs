@@ -155,9 +155,15 @@ pub(super) fn no_command(why: &CommandError) -> Response {
 
 /// A session that does not answer.
 pub(super) fn no_answer() -> Response {
-    let why = "the session has not answered; what was asked for may still act";
-    problem(StatusCode::GATEWAY_TIMEOUT, "no_answer", why)
+    problem(StatusCode::GATEWAY_TIMEOUT, "no_answer", NO_ANSWER)
 }
+
+/// As [`no_answer`], for a message of `/ws`.
+pub(super) fn no_answer_details() -> Value {
+    details(StatusCode::GATEWAY_TIMEOUT, "no_answer", NO_ANSWER)
+}
+
+const NO_ANSWER: &str = "the session has not answered; what was asked for may still act";
 
 /// A command that did not act.
 pub(super) fn refused(why: &Refused) -> Response {

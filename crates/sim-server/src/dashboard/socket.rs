@@ -18,7 +18,7 @@ use super::hub::Hub;
 use super::strip::Strip;
 use super::{Published, Shared, api, problem};
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
-use crate::session::{DEFAULT, Refused, Wish};
+use crate::session::{self, DEFAULT, Refused, Wish};
 
 /// New rows of the strip plots are sent at most this often, in frames.
 const FRAMES_PER_STRIP: u32 = 10;
@@ -207,15 +207,21 @@ impl Viewer {
         let Ok(place) = Arc::clone(&self.commands).try_acquire_owned() else {
             return self.say(&refused(&id, &problem::refused_details(&Refused::TooMany))).await;
         };
-        let (answers, handle) = (self.answers.clone(), self.shared.handle.clone());
+        // Sent before the next one is read: commands act in the order in which they were said
+        let handle = &self.shared.handle;
+        let sent = api::command_of(handle, wish).await.and_then(|command| handle.send(command));
+        let answers = self.answers.clone();
         tokio::spawn(async move {
-            let acted = tokio::time::timeout(api::LONGEST_WAIT, api::carry_out(handle, wish)).await;
+            let acted = match sent {
+                Ok(sent) => tokio::time::timeout(api::LONGEST_WAIT, session::answer(sent)).await,
+                Err(why) => Ok(Err(why)),
+            };
             let answer = match acted {
                 Ok(Ok(acted)) => {
                     api::with(json!({ "schema": SCHEMA, "kind": "ack", "id": id }), &acted)
                 }
                 Ok(Err(why)) => refused(&id, &problem::refused_details(&why)),
-                Err(_) => refused(&id, &problem::refused_details(&Refused::TooMany)),
+                Err(_) => refused(&id, &problem::no_answer_details()),
             };
             // The viewer may have left
             let _ = answers.send(answer).await;

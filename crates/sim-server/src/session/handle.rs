@@ -94,6 +94,17 @@ pub(crate) struct Asked {
     pub(crate) reply: oneshot::Sender<Result<Acted, Refused>>,
 }
 
+/// What comes when a command has acted.
+pub(crate) type Answer = oneshot::Receiver<Result<Acted, Refused>>;
+
+/// Waits until a command has acted.
+///
+/// # Errors
+/// [`Refused`].
+pub(crate) async fn answer(answer: Answer) -> Result<Acted, Refused> {
+    answer.await.unwrap_or(Err(Refused::Ended))
+}
+
 /// The bodies of the latest tick.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bodies {
@@ -157,12 +168,20 @@ impl Handle {
     /// # Errors
     /// [`Refused`].
     pub(crate) async fn ask(&self, command: Command) -> Result<Acted, Refused> {
+        answer(self.send(command)?).await
+    }
+
+    /// Sends a command now, before those that are sent later.
+    ///
+    /// # Errors
+    /// [`Refused`]: it is not taken.
+    pub(crate) fn send(&self, command: Command) -> Result<Answer, Refused> {
         let (reply, answer) = oneshot::channel();
         self.queue.try_send(Asked { command, reply }).map_err(|e| match e {
             TrySendError::Full(_) => Refused::TooMany,
             TrySendError::Disconnected(_) => Refused::Ended,
         })?;
-        answer.await.unwrap_or(Err(Refused::Ended))
+        Ok(answer)
     }
 
     /// The command that puts the present scenario back to its start, with the same seed or another

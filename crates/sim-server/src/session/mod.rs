@@ -19,7 +19,7 @@ mod vehicle;
 pub(crate) use command::{Command, CommandError, Wish};
 use drive::{Drive, Ended, Job, Reply};
 use handle::Asked;
-pub(crate) use handle::{Acted, Handle, Next, Refused, RunState, State, channel};
+pub(crate) use handle::{Acted, Handle, Next, Refused, RunState, State, answer, channel};
 pub(crate) use pace::Pace;
 pub(crate) use registry::{Claim, DEFAULT, Registry};
 pub(crate) use runs::{Begin, Place, RESULTS, Runs, first_world, setting};
