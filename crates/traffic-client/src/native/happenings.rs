@@ -214,9 +214,13 @@ impl Engine {
         true
     }
 
-    /// The nearest stretch in the way ahead in a lane, of which a driver at `s_m` knows.
-    pub(super) fn block_ahead(&self, lane: u16, s_m: f64) -> Option<&Block> {
-        let known = |b: &&Block| b.lane == lane && s_m < b.to_m && s_m > b.from_m - b.ahead_m;
+    /// The nearest stretch in the way ahead in a lane, of which driver `i` knows.
+    pub(super) fn block_ahead(&self, i: usize, lane: u16) -> Option<&Block> {
+        let s_m = self.state.fleet.s_m[i];
+        let frac = self.ahead_frac(self.state.fleet.driver[i].class);
+        // Barriers are announced; a vehicle that stands is seen.
+        let ahead_m = |b: &Block| if b.is_closed { b.ahead_m * frac } else { b.ahead_m };
+        let known = |b: &&Block| b.lane == lane && s_m < b.to_m && s_m > b.from_m - ahead_m(b);
         let known = self.blocks.iter().filter(known);
         known.min_by(|a, b| a.from_m.total_cmp(&b.from_m))
     }
@@ -251,11 +255,11 @@ impl Engine {
         let fleet = &self.state.fleet;
         let (lane, s_m) = (fleet.lane[i], fleet.s_m[i]);
         let sides = |side: usize| self.near.lanes[i][side];
-        if let Some(block) = self.block_ahead(lane, s_m) {
+        if let Some(block) = self.block_ahead(i, lane) {
             let reach = |side: usize| match sides(side) {
                 NO_LANE => f64::NEG_INFINITY,
                 k if !self.map.is_open_to(k, fleet.driver[i].exit) => f64::NEG_INFINITY,
-                k => self.block_ahead(k, s_m).map_or(f64::INFINITY, |b| b.from_m),
+                k => self.block_ahead(i, k).map_or(f64::INFINITY, |b| b.from_m),
             };
             let side = if reach(LEFT) >= reach(RIGHT) { LEFT } else { RIGHT };
             if reach(side) > block.from_m {
@@ -275,7 +279,7 @@ impl Engine {
     /// Whether a driver keeps out of a lane because of what happens there.
     pub(super) fn keeps_out(&self, i: usize, lane: u16) -> bool {
         let s_m = self.state.fleet.s_m[i];
-        self.block_ahead(lane, s_m).is_some()
+        self.block_ahead(i, lane).is_some()
             || self
                 .rushing
                 .iter()

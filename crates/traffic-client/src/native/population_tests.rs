@@ -182,10 +182,14 @@ fn flat() -> LaneMap {
 
 /// The mean of three seeds: whether and when a queue breaks down is chance.
 fn mean_served_1_h(config: &TrafficConfig, map: &LaneMap, detector_m: f64) -> f64 {
+    mean_of_1_h(3, config, map, detector_m)
+}
+
+fn mean_of_1_h(seeds: u64, config: &TrafficConfig, map: &LaneMap, detector_m: f64) -> f64 {
     let served = |seed| {
         served_1_h(TrafficConfig { seed, ..config.clone() }, map.clone(), 1800.0, detector_m)
     };
-    (3..6).map(served).sum::<f64>() / 3.0
+    (3..3 + seeds).map(served).sum::<f64>() / seeds as f64
 }
 
 /// Vehicles per hour and lane that pass a station between 600 s and the end.
@@ -219,10 +223,18 @@ fn a_queue_before_an_on_ramp_is_served_nearly_as_fast_as_the_flat_road() {
 }
 
 #[test]
-fn a_queue_before_a_lane_drop_is_served_nearly_as_fast_as_the_flat_road() {
-    // The story: trucks stood in the left lane that ended, needed the room of three cars to get out
-    // of it, and 17 to 20 % of the capacity was lost. Where the law keeps them out of it:
-    // 11 % over twelve seeds, of which these are three.
+fn a_queue_with_trucks_before_a_lane_drop_is_served_nearly_as_fast_as_the_flat_road() {
+    // The story: trucks zipped where cars did, at the head of the queue. Each needed the room of
+    // three cars there and pulled away slowly, and 17 to 20 % of the capacity was lost. Farther back
+    // their gaps close again before the head: 9 % over twelve seeds, of which these are three.
+    let flat = mean_served_1_h(&demand(0.2, 2400.0), &flat(), 3500.0);
+    let drop = mean_served_1_h(&demand(0.2, 1900.0), &lane_drop(30.0), 4000.0);
+    assert!(drop > 0.88 * flat, "{drop} of {flat} per hour and lane");
+}
+
+#[test]
+fn a_queue_before_a_lane_drop_without_trucks_in_the_left_lane_is_served() {
+    // Where the law keeps trucks out of it: 11 % less than the flat road over twelve seeds.
     let flat = mean_served_1_h(&demand(0.2, 2400.0), &flat(), 3500.0);
     let law = TrafficConfig { trucks_keep_out_of_left_lane: true, ..demand(0.2, 1900.0) };
     let drop = mean_served_1_h(&law, &lane_drop(30.0), 4000.0);
@@ -335,11 +347,14 @@ fn figures() {
     }
     for trucks in [0.0, 0.2] {
         let ramp = TrafficConfig { ramp_spawn_probability: 0.025, ..demand(trucks, 1900.0) };
+        let law = TrafficConfig { trucks_keep_out_of_left_lane: true, ..demand(trucks, 1900.0) };
         eprintln!(
-            "trucks {trucks}, per hour and lane: flat {:.0}, on-ramp {:.0}, lane drop {:.0}",
-            mean_served_1_h(&demand(trucks, 2400.0), &flat(), 3500.0),
-            mean_served_1_h(&ramp, &on_ramp(300.0, 30.0), 3500.0),
-            mean_served_1_h(&demand(trucks, 1900.0), &lane_drop(30.0), 4000.0),
+            "trucks {trucks}, per hour and lane: flat {:.0}, on-ramp {:.0}, lane drop {:.0}, \
+             without trucks in the left lane {:.0}",
+            mean_of_1_h(12, &demand(trucks, 2400.0), &flat(), 3500.0),
+            mean_of_1_h(12, &ramp, &on_ramp(300.0, 30.0), 3500.0),
+            mean_of_1_h(12, &demand(trucks, 1900.0), &lane_drop(30.0), 4000.0),
+            mean_of_1_h(12, &law, &lane_drop(30.0), 4000.0),
         );
     }
 }
