@@ -162,7 +162,7 @@ fn a_silent_engine_is_noticed_in_time_and_the_truck_brought_to_a_stop() {
     let (fault, after_s) = detected_after_s(&mut world, |world| {
         if !std::mem::replace(&mut done, true) {
             let ecu = world.bus_mut().unwrap().ecu();
-            ecu.break_down(EcuFault::Silent(Unit::Engine));
+            ecu.set_fault(EcuFault::Silent(Unit::Engine), true);
         }
     });
     assert_eq!(fault, VehicleFault::SignalLost);

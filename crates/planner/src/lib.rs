@@ -48,7 +48,9 @@ pub use drive::{DriveError, TickOutcome, drive_tick};
 pub use error::PlannerError;
 pub use situation::Situation;
 pub use speed::SpeedProfile;
-pub use stack::{RatesConfig, SpeedPlannerKind, Stack, StackConfig, TacticalPlan, Tactics};
+pub use stack::{
+    OutsideDemand, RatesConfig, SpeedPlannerKind, Stack, StackConfig, TacticalPlan, Tactics,
+};
 
 /// Angle in -pi..pi.
 pub(crate) fn wrapped(angle_rad: f64) -> f64 {

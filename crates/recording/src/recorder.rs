@@ -166,6 +166,11 @@ impl Recording {
         }
     }
 
+    /// Notes a change of the stack in words: between the step before `now` and that of `now`.
+    pub fn change(&mut self, now: Time, change_toml: String) {
+        self.send(now, Note::Change(now, change_toml));
+    }
+
     /// Whether the writer has given up; [`Self::finish`] says why.
     #[must_use]
     pub const fn is_broken(&self) -> bool {

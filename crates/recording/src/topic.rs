@@ -7,7 +7,7 @@ use byteorder::LittleEndian;
 use crate::error::RecordingError;
 use crate::ros::Message;
 use crate::ros::diagnostic::DiagnosticArray;
-use crate::ros::input::{BusTick, CanFrame, StackInput, StackLimits, StackScene};
+use crate::ros::input::{BusTick, CanFrame, StackChange, StackInput, StackLimits, StackScene};
 use crate::ros::marker::MarkerArray;
 use crate::ros::schema::schema_text;
 use crate::ros::standard::{Clock, Imu, NavSatFix, Odometry, Path, TfMessage};
@@ -107,12 +107,14 @@ pub(crate) const LANES: TopicOf<MarkerArray> = TopicOf::latched("/road/lanes");
 pub(crate) const LIMITS: TopicOf<StackLimits> = TopicOf::new("/stack/limits", TICK_HZ);
 pub(crate) const VEHICLES: TopicOf<StackScene> = TopicOf::new("/stack/scene", TICK_HZ);
 pub(crate) const INPUT: TopicOf<StackInput> = TopicOf::new("/stack/input", TICK_HZ);
+/// Changes of the stack between two ticks.
+pub(crate) const CHANGES: TopicOf<StackChange> = TopicOf::new("/stack/change", 1);
 /// Of a drive over a bus; `BUS` stands for its name.
 pub(crate) const CAN_FRAMES: TopicOf<CanFrame> = TopicOf::new("/can/BUS/frames", TICK_HZ);
 pub(crate) const CAN_TICKS: TopicOf<BusTick> = TopicOf::new("/can/BUS/ticks", TICK_HZ);
 
 /// Every topic, in the order in which a file opens them.
-pub const TOPICS: [Topic; 16] = [
+pub const TOPICS: [Topic; 17] = [
     STATIC_FRAMES.topic,
     FIX.topic,
     CLOCK.topic,
@@ -129,6 +131,7 @@ pub const TOPICS: [Topic; 16] = [
     LIMITS.topic,
     VEHICLES.topic,
     INPUT.topic,
+    CHANGES.topic,
 ];
 
 #[cfg(test)]

@@ -8,10 +8,12 @@ use crate::error::RecordingError;
 use crate::file::McapFile;
 use crate::inputs::{BusCall, SceneWriter, StepNote, call_messages};
 use crate::recorder::Listener;
-use crate::ros::input::{StackLimits, StackScene};
+use crate::ros::input::{StackChange, StackLimits, StackScene};
 use crate::schedule::Due;
 use crate::telemetry::{Scenery, lanes_at_start, messages, static_frames};
-use crate::topic::{CAN_FRAMES, CAN_TICKS, FIX, INPUT, LIMITS, TOPICS, TopicMessage, VEHICLES};
+use crate::topic::{
+    CAN_FRAMES, CAN_TICKS, CHANGES, FIX, INPUT, LIMITS, TOPICS, TopicMessage, VEHICLES,
+};
 
 /// Name of the record that says how many notes were left out at its place.
 pub(crate) const GAP_RECORD: &str = "gap";
@@ -30,6 +32,8 @@ pub(crate) enum Note {
     Tick(Box<Record>),
     Step(Time, Result<Box<StepNote>, RecordingError>),
     Calls(Vec<BusCall>),
+    /// A change of the stack in words.
+    Change(Time, String),
 }
 
 /// One tick on its way to the writer.
@@ -143,6 +147,10 @@ impl Writer {
                             self.file.write(call.now, &message)?;
                         }
                     }
+                }
+                Note::Change(now, change_toml) => {
+                    let message = CHANGES.encode(&StackChange { now_ns: now.0, change_toml })?;
+                    self.file.write(now, &message)?;
                 }
                 Note::Step(now, note) => self.write_step(now, *note?)?,
                 Note::Tick(record) => {

@@ -104,6 +104,7 @@ fn refused(why: &Refused) -> ros2::Refused {
     match why {
         Refused::WrongState { .. } | Refused::Ended => ros2::Refused::IncorrectState(text),
         Refused::NoExternalDecider
+        | Refused::NoBus(_)
         | Refused::OutsideBus(_)
         | Refused::OneSumo
         | Refused::SecondSumo => ros2::Refused::Unsupported(text),

@@ -11,122 +11,41 @@ mod support;
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Stdio};
 use std::time::Duration;
 
 use serde_json::Value;
+use support::run::Run;
+use support::serving::refusal;
 use support::{client, program};
-
-/// A run with a dashboard on a free port.
-struct Run {
-    process: Child,
-    address: String,
-    folder: tempfile::TempDir,
-}
-
-impl Run {
-    fn start(options: &[&str]) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let mut process = program()
-            .args(["run", "flat", "--port", "0", "--keep-open", "--out"])
-            .arg(folder.path().join("out"))
-            .args(options)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stderr.take().unwrap()).read_line(&mut line).unwrap();
-        let address = line.split("http://").nth(1).unwrap_or_else(|| panic!("{line}"));
-        let address = address.split_whitespace().next().unwrap().to_owned();
-        Self { process, address, folder }
-    }
-
-    /// Status and body of a request.
-    fn ask(&self, method: &str, path: &str, more_headers: &str, body: &[u8]) -> (u16, Value) {
-        client::ask(&self.address, method, path, more_headers, body)
-    }
-
-    fn control(&self, body: &str) -> (u16, Value) {
-        self.ask("POST", "/api/v1/control", "", body.as_bytes())
-    }
-
-    /// A command that acts.
-    fn act(&self, body: &str) -> Value {
-        let (status, answer) = self.control(body);
-        assert_eq!(status, 200, "{body}: {answer}");
-        answer
-    }
-
-    /// Waits until the program has ended, and reads a summary of its folder.
-    fn end(mut self, summary: &str) -> Value {
-        for _ in 0..600 {
-            if self.process.try_wait().unwrap().is_some() {
-                let text = std::fs::read(self.folder.path().join("out").join(summary)).unwrap();
-                return serde_json::from_slice(&text).unwrap();
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        panic!("it does not end")
-    }
-
-    /// The frame, once there is one.
-    fn state(&self) -> Value {
-        for _ in 0..600 {
-            let (status, state) = self.ask("GET", "/api/v1/state", "", b"");
-            if status == 200 {
-                return state;
-            }
-            assert_eq!(state["type"], "urn:tractrix:no_tick_yet");
-            std::thread::sleep(Duration::from_millis(100));
-        }
-        panic!("no frame")
-    }
-}
-
-impl Drop for Run {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-fn refused(answer: &(u16, Value), status: u16, code: &str, words: &str) {
-    let (got, body) = answer;
-    let kind = format!("urn:tractrix:{code}");
-    assert_eq!((*got, &body["type"], &body["schema"]), (status, &kind.into(), &1.into()), "{body}");
-    assert_eq!(body["status"], status);
-    assert!(body["detail"].as_str().unwrap().contains(words), "{body}");
-}
 
 #[test]
 fn refusals_are_json_with_a_code_and_words_of_the_api() {
     let run = Run::start(&[]);
-    refused(&run.control("nonsense"), 400, "not_an_object", "JSON object");
-    refused(&run.control(r#"{"action": "fly"}"#), 400, "unknown_action", "fly");
-    refused(&run.control(r#"{"action": "step"}"#), 400, "missing_key", "ticks");
-    refused(&run.control(r#"{"action": "pace", "pace": -1}"#), 400, "wrong_value", "pace = -1");
-    refused(&run.ask("POST", "/api/v1/control", "", b"\xff\xfe"), 400, "not_an_object", "JSON");
-    refused(&run.ask("GET", "/api/v1/nothing", "", b""), 404, "not_found", "/api/v1/nothing");
-    refused(&run.ask("GET", "/api/v1/control", "", b""), 405, "method_not_allowed", "GET");
+    refusal(&run.control("nonsense"), 400, "not_an_object", "JSON object");
+    refusal(&run.control(r#"{"action": "fly"}"#), 400, "unknown_action", "fly");
+    refusal(&run.control(r#"{"action": "step"}"#), 400, "missing_key", "ticks");
+    refusal(&run.control(r#"{"action": "pace", "pace": -1}"#), 400, "wrong_value", "pace = -1");
+    refusal(&run.ask("POST", "/api/v1/control", "", b"\xff\xfe"), 400, "not_an_object", "JSON");
+    refusal(&run.ask("GET", "/api/v1/nothing", "", b""), 404, "not_found", "/api/v1/nothing");
+    refusal(&run.ask("GET", "/api/v1/control", "", b""), 405, "method_not_allowed", "GET");
     let evil = "Host: evil.example\r\n";
-    refused(&run.ask("GET", "/api/v1/state", evil, b""), 403, "foreign_page", "this server");
+    refusal(&run.ask("GET", "/api/v1/state", evil, b""), 403, "foreign_page", "this server");
     let long = "Content-Length: 9000000\r\n";
-    refused(&run.ask("POST", "/api/v1/control", long, b""), 413, "body_not_read", "too long");
+    refusal(&run.ask("POST", "/api/v1/control", long, b""), 413, "body_not_read", "too long");
     for kind in ["text/plain", "application/x-www-form-urlencoded", "application/jsonx"] {
         let kind = format!("Content-Type: {kind}\r\n");
         let form = run.ask("POST", "/api/v1/control", &kind, br#"{"action": "pause"}"#);
-        refused(&form, 415, "not_json", "application/json");
+        refusal(&form, 415, "not_json", "application/json");
     }
     for headers in ["Origin: null\r\n", "Sec-Fetch-Site: cross-site\r\n"] {
         let elsewhere = run.ask("POST", "/api/v1/control", headers, br#"{"action": "pause"}"#);
-        refused(&elsewhere, 403, "foreign_page", "this server");
+        refusal(&elsewhere, 403, "foreign_page", "this server");
     }
 }
 
 /// A connection on which a head is sent as it is.
 fn sent(run: &Run, head: &str) -> TcpStream {
-    let mut stream = TcpStream::connect(&run.address).unwrap();
+    let mut stream = TcpStream::connect(&run.serving.address).unwrap();
     stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
     stream.write_all(head.as_bytes()).unwrap();
     stream
@@ -175,14 +94,14 @@ fn the_one_session_is_listed_and_others_are_not_there() {
     for missing in ["", "/state", "/control", "/road"] {
         let other = format!("/api/v1/sessions/other{missing}");
         let method = if missing == "/control" { "POST" } else { "GET" };
-        refused(&run.ask(method, &other, "", b"{}"), 404, "no_session", "\"other\"");
+        refusal(&run.ask(method, &other, "", b"{}"), 404, "no_session", "\"other\"");
     }
-    refused(&run.ask("GET", &path("nothing"), "", b""), 404, "not_found", "nothing");
+    refusal(&run.ask("GET", &path("nothing"), "", b""), 404, "not_found", "nothing");
 }
 
 /// The body of an answer of any kind.
 fn text(run: &Run, path: &str) -> String {
-    client::text(&run.address, path)
+    client::text(&run.serving.address, path)
 }
 
 #[test]
@@ -223,7 +142,7 @@ fn viewers_have_sixteen_places_and_listen() {
     let handshake = format!(
         "GET /ws HTTP/1.1\r\nHost: {}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
          Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
-        run.address
+        run.serving.address
     );
     let mut viewers: Vec<_> = (0..16).map(|_| sent(&run, &handshake)).collect();
     for viewer in &mut viewers {
@@ -280,7 +199,7 @@ fn a_pace_is_a_number_or_a_word() {
 #[test]
 fn a_lane_change_is_taken_only_where_the_decider_is_external() {
     let wish = r#"{"action": "lane_change", "to": "left"}"#;
-    refused(&Run::start(&[]).control(wish), 409, "no_external_decider", "--decider external");
+    refusal(&Run::start(&[]).control(wish), 409, "no_external_decider", "set_decider");
     assert_eq!(Run::start(&["--decider", "external"]).control(wish).0, 200);
 }
 
@@ -348,12 +267,12 @@ fn a_world_that_was_kept_goes_on_with_the_bits_that_it_would_have_had() {
     run.act(r#"{"action": "set_speed", "speed_m_s": 12}"#);
     step(400);
     let unknown = run.control(r#"{"action": "restore", "name": "there"}"#);
-    refused(&unknown, 409, "nothing_kept", "\"there\"");
+    refusal(&unknown, 409, "nothing_kept", "\"there\"");
     for number in 1..8 {
         run.act(&format!(r#"{{"action": "snapshot", "name": "more-{number}"}}"#));
     }
     let more = run.control(r#"{"action": "snapshot", "name": "more-8"}"#);
-    refused(&more, 409, "too_many_kept", "8 worlds");
+    refusal(&more, 409, "too_many_kept", "8 worlds");
     run.act(r#"{"action": "snapshot", "name": "here"}"#);
     run.act(r#"{"action": "quit"}"#);
     let out = run.folder.path().join("out");
@@ -398,14 +317,14 @@ fn commands_in_a_wrong_state_are_refused_with_what_they_need() {
         run.state()["run"]["state"] == "finished"
     });
     assert!(ended);
-    refused(&run.control(step), 409, "run_ended", "has ended");
+    refusal(&run.control(step), 409, "run_ended", "has ended");
     let stopped = run.act(r#"{"action": "stop"}"#);
     assert_eq!((&stopped["state"], &stopped["tick"]), (&"stopped".into(), &0.into()));
-    refused(&run.control(step), 409, "wrong_state", "pause it first");
+    refusal(&run.control(step), 409, "wrong_state", "pause it first");
     assert_eq!(run.act(r#"{"action": "pause"}"#)["state"], "paused");
     assert_eq!(run.act(step)["tick"], 10);
     let far = r#"{"action": "step_until", "time_s": 1e9, "wait": true}"#;
-    refused(&run.control(far), 422, "too_far", "at most 1000000");
+    refusal(&run.control(far), 422, "too_far", "at most 1000000");
     run.act(r#"{"action": "pace", "pace": 0.01}"#);
     std::thread::scope(|scope| {
         let waiting =
@@ -416,8 +335,8 @@ fn commands_in_a_wrong_state_are_refused_with_what_they_need() {
         });
         assert!(steps);
         let second = r#"{"action": "step", "ticks": 1}"#;
-        refused(&run.control(second), 409, "wrong_state", "let a step end");
+        refusal(&run.control(second), 409, "wrong_state", "let a step end");
         run.act(r#"{"action": "play"}"#);
-        refused(&waiting.join().unwrap(), 409, "cut_short", "were not driven");
+        refusal(&waiting.join().unwrap(), 409, "cut_short", "were not driven");
     });
 }

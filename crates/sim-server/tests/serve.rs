@@ -9,17 +9,15 @@
 
 mod support;
 
-use std::io::{BufRead, BufReader};
-use std::process::{Child, Stdio};
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use support::serving::{Serving, refusal};
 use support::{client, program, refused};
 
 /// A server without a run, on a free port.
 struct Server {
-    process: Child,
-    address: String,
+    serving: Serving,
     folder: tempfile::TempDir,
 }
 
@@ -27,25 +25,15 @@ impl Server {
     fn start(options: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         std::fs::create_dir(folder.path().join("tmp")).unwrap();
-        let mut process = program()
-            .env("TMPDIR", folder.path().join("tmp"))
-            .args(["serve", "--port", "0", "--runs"])
-            .arg(folder.path().join("runs"))
-            .args(options)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut line = String::new();
-        BufReader::new(process.stderr.take().unwrap()).read_line(&mut line).unwrap();
-        let address = line.split("http://").nth(1).unwrap_or_else(|| panic!("{line}"));
-        let address = address.split_whitespace().next().unwrap().to_owned();
-        Self { process, address, folder }
+        let mut command = program();
+        command.env("TMPDIR", folder.path().join("tmp"));
+        command.args(["serve", "--port", "0", "--runs"]).arg(folder.path().join("runs"));
+        Self { serving: Serving::start(command.args(options)), folder }
     }
 
     fn ask(&self, method: &str, path: &str, body: &Value) -> (u16, Value) {
         let body = if body.is_null() { String::new() } else { body.to_string() };
-        client::ask(&self.address, method, path, "", body.as_bytes())
+        client::ask(&self.serving.address, method, path, "", body.as_bytes())
     }
 
     fn get(&self, path: &str) -> (u16, Value) {
@@ -83,30 +71,10 @@ impl Server {
 
     /// Ends the server as a service manager does.
     fn end(&mut self) -> Option<i32> {
-        let id = self.process.id().to_string();
+        let id = self.serving.id().to_string();
         assert!(std::process::Command::new("kill").arg(&id).status().unwrap().success());
-        for _ in 0..1200 {
-            if let Some(status) = self.process.try_wait().unwrap() {
-                return status.code();
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        panic!("it does not end")
+        self.serving.wait()
     }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-fn refusal(answer: &(u16, Value), status: u16, code: &str, words: &str) {
-    let (got, body) = answer;
-    let kind = format!("urn:tractrix:{code}");
-    assert_eq!((*got, &body["type"]), (status, &kind.into()), "{body}");
-    assert!(body["detail"].as_str().unwrap().contains(words), "{body}");
 }
 
 /// Eight worlds in one process, each in its own thread: none of them knows of the others.
@@ -178,12 +146,12 @@ fn a_session_is_commanded_ended_and_its_place_is_free_again() {
     assert_eq!(server.get(&format!("{path}/state")).0, 200);
     assert_eq!(control(json!({ "action": "reset", "seed": 5 })).0, 200);
     assert_eq!(server.get(&path).1["run"], "my-road--5");
-    let (status, metrics) = (200, client::text(&server.address, "/api/v1/metrics"));
+    let (status, metrics) = (200, client::text(&server.serving.address, "/api/v1/metrics"));
     assert_eq!(status, 200);
     assert!(metrics.contains("tractrix_ticks_total{session=\"s1\"} 100"), "{metrics}");
-    assert_eq!(client::status(&server.address, "DELETE", &path), 204);
+    assert_eq!(client::status(&server.serving.address, "DELETE", &path), 204);
     refusal(&server.get(&path), 404, "no_session", "s1");
-    assert!(!client::text(&server.address, "/api/v1/metrics").contains("session=\"s1\""));
+    assert!(!client::text(&server.serving.address, "/api/v1/metrics").contains("session=\"s1\""));
     assert_eq!(server.summary("my-road--1")["end_reason"], "interrupted");
     assert_eq!(server.summary("my-road--5")["seed"], 5);
     let again = server.begin(&json!({ "scenario": "flat", "state": "playing" }));
@@ -246,7 +214,7 @@ fn runs_are_listed_played_compared_downloaded_and_removed() {
     assert!(frames[0]["ego"]["speed_m_s"].as_f64().unwrap() > 1.0);
     assert!(frames[0]["plan"]["path_xy_m"].as_array().unwrap().len() > 10);
     assert!(server.get(&of("road")).1["length_m"].as_f64().unwrap() > 1000.0);
-    let report = client::text(&server.address, &of("report"));
+    let report = client::text(&server.serving.address, &of("report"));
     assert!(report.contains("state hash") && !report.contains("<script src"), "one file");
     refusal(&server.get(&of("frames?from_s=1")), 400, "wrong_query", "to_s");
 
@@ -259,17 +227,18 @@ fn runs_are_listed_played_compared_downloaded_and_removed() {
     assert!(other["other_scene_s"].as_f64().unwrap() < 20.0, "other traffic: {other}");
 
     let whole = std::fs::read(server.run(&runs[0]).join("run.mcap")).unwrap();
-    assert_eq!(client::bytes(&server.address, &of("recording"), ""), (200, whole.clone()));
-    let part = client::bytes(&server.address, &of("recording"), "Range: bytes=8-107\r\n");
+    assert_eq!(client::bytes(&server.serving.address, &of("recording"), ""), (200, whole.clone()));
+    let part = client::bytes(&server.serving.address, &of("recording"), "Range: bytes=8-107\r\n");
     assert_eq!(part, (206, whole[8..108].to_vec()));
-    let beyond = client::bytes(&server.address, &of("recording"), "Range: bytes=99999999-\r\n");
+    let beyond =
+        client::bytes(&server.serving.address, &of("recording"), "Range: bytes=99999999-\r\n");
     assert_eq!(beyond.0, 416);
 
     for name in ["nothing", "..", "%2e%2e", "..%2Fruns", "a%00b", "Highway-1"] {
         refusal(&server.get(&format!("/api/v1/runs/{name}")), 404, "no_run", "");
     }
     assert_eq!(
-        client::status(&server.address, "DELETE", &format!("/api/v1/runs/{}", runs[2])),
+        client::status(&server.serving.address, "DELETE", &format!("/api/v1/runs/{}", runs[2])),
         204
     );
     assert!(!server.run(&runs[2]).exists());
@@ -288,7 +257,7 @@ fn the_finished_part_of_a_run_under_way_is_a_whole_recording() {
     let path = format!("/api/v1/runs/{run}");
     refusal(&server.ask("DELETE", &path, &Value::Null), 409, "run_is_recording", run);
     refusal(&server.get(&format!("{path}/strip")), 409, "run_is_recording", run);
-    let (status, part) = client::bytes(&server.address, &format!("{path}/recording"), "");
+    let (status, part) = client::bytes(&server.serving.address, &format!("{path}/recording"), "");
     assert_eq!(status, 200);
     let file = server.folder.path().join("part.mcap");
     std::fs::write(&file, part).unwrap();
@@ -316,7 +285,7 @@ fn a_job_leaves_what_the_command_would() {
                  --speed-min-m-s 20 --speed-max-m-s 24 --out";
     let status = program().args(words.split_whitespace()).arg(&out).output().unwrap().status;
     assert!(status.success());
-    let csv = client::text(&server.address, &format!("{path}/files/plan.csv"));
+    let csv = client::text(&server.serving.address, &format!("{path}/files/plan.csv"));
     assert_eq!(csv, std::fs::read_to_string(out.join("plan.csv")).unwrap());
     for file in ["nothing.csv", "..", "..%2Fplan.csv"] {
         refusal(&server.get(&format!("{path}/files/{file}")), 404, "not_found", "");
@@ -328,7 +297,7 @@ fn a_job_leaves_what_the_command_would() {
     let failed = server.wait_for(&path, |job| job["status"] == "failed");
     assert_eq!(failed["exit_code"], 2);
     assert!(failed["why"].as_str().unwrap().contains("--mass-kg"), "{failed}");
-    assert_eq!(client::status(&server.address, "DELETE", &path), 204);
+    assert_eq!(client::status(&server.serving.address, "DELETE", &path), 204);
     refusal(&server.get(&path), 404, "no_job", "");
     let diagnose = |body: Value| server.ask("POST", "/api/v1/diagnose", &body);
     refusal(&diagnose(json!({ "truck": "sinotruk" })), 400, "wrong_body", "drives or run");
@@ -369,17 +338,24 @@ fn a_token_opens_every_door_and_nothing_else_does() {
         for header in
             ["", "Authorization: Bearer a-token-of-some-lengt\r\n", "Cookie: tractrix_token=\r\n"]
         {
-            let refused = client::ask(&server.address, "GET", path, header, b"");
+            let refused = client::ask(&server.serving.address, "GET", path, header, b"");
             refusal(&refused, 401, "unauthorized", "token");
         }
     }
     let bearer = format!("Authorization: Bearer {TOKEN}\r\n");
-    assert_eq!(client::ask(&server.address, "GET", "/api/v1/sessions", &bearer, b"").0, 200);
+    assert_eq!(
+        client::ask(&server.serving.address, "GET", "/api/v1/sessions", &bearer, b"").0,
+        200
+    );
     let cookie = format!("Cookie: tractrix_token={TOKEN}\r\n");
-    assert_eq!(client::bytes(&server.address, "/runs", &cookie).0, 200);
-    assert_eq!(client::bytes(&server.address, &format!("/runs?token={TOKEN}"), "").0, 303);
+    assert_eq!(client::bytes(&server.serving.address, "/runs", &cookie).0, 200);
+    assert_eq!(client::bytes(&server.serving.address, &format!("/runs?token={TOKEN}"), "").0, 303);
     let api = format!("/api/v1/sessions?token={TOKEN}");
-    assert_eq!(client::bytes(&server.address, &api, "").0, 401, "an address is no place for it");
+    assert_eq!(
+        client::bytes(&server.serving.address, &api, "").0,
+        401,
+        "an address is no place for it"
+    );
 }
 
 #[test]

@@ -116,7 +116,7 @@ fn drive(scenario: &Scenario, case: &Case) -> Result<(), SimError> {
         let now = world.now();
         if now.seconds() >= FROM_S {
             if let (0, Some(fault), Some(bus)) = (ticks, case.broken, world.bus_mut()) {
-                bus.ecu().break_down(fault);
+                bus.ecu().set_fault(fault, true);
             }
             if let (0, Some(bus)) = (ticks, world.bus_mut()) {
                 bus.jump_clock(case.jump_ns);

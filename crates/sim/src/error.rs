@@ -65,6 +65,15 @@ pub enum SimError {
         /// What it must be.
         why: String,
     },
+    /// A change of the stack that is not understood, or that cannot be put into words.
+    #[error("change of the stack: {0}")]
+    ChangeWords(String),
+    /// Only a truck on a bus has what is to be broken.
+    #[error("fault {fault}: only a truck on a bus has that (--vehicle bus)")]
+    NoBus {
+        /// The fault's word.
+        fault: &'static str,
+    },
     /// The trip cannot be planned.
     #[error(transparent)]
     Trip(#[from] planner::pcc::PccError),

@@ -142,6 +142,19 @@ pub(crate) fn decider_kind(text: &str) -> Result<(DeciderKind, Option<String>), 
     Ok((kind, None))
 }
 
+/// A decider by its word, as `--decider` has it; a policy is `dqn`, whatever its file.
+#[must_use]
+pub fn decider_word(kind: &DeciderKind) -> String {
+    match kind {
+        DeciderKind::KeepLane => "keep".to_owned(),
+        DeciderKind::Rules { distance_m } => format!("rules:{distance_m}"),
+        DeciderKind::Mobil(_) => "mobil".to_owned(),
+        DeciderKind::Rollout(_) => "rollout".to_owned(),
+        DeciderKind::Dqn => "dqn".to_owned(),
+        DeciderKind::External => "external".to_owned(),
+    }
+}
+
 /// A field-less value by its word in a scenario file.
 fn word<'a, T>(option: &'static str, value: &'a str, known: &str) -> Result<T, SimError>
 where
@@ -151,7 +164,7 @@ where
         .map_err(|_| refused(option, value, &format!("expected {known}")))
 }
 
-fn refused(option: &'static str, value: &str, why: &str) -> SimError {
+pub(crate) fn refused(option: &'static str, value: &str, why: &str) -> SimError {
     SimError::Override { option, value: value.to_owned(), why: why.to_owned() }
 }
 

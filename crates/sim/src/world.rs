@@ -1,19 +1,22 @@
 //! One world: road, truck, traffic, stack and metrics, moved tick by tick.
 
+use std::cell::Cell;
 use std::path::Path;
 use std::sync::Arc;
 
 use dynamics::TruckModel;
 use j1939::BitRate;
 use j1939::bus::Bus;
+use planner::decider::DeciderKind;
 use planner::{RatesConfig, Situation, Stack, StackConfig, Tactics};
 use road::Road;
 use tractrix_core::{Geometry, Recorder, Scene, Tick, Time, TrafficSource, Vehicle, VehicleLimits};
 
 use crate::ecu::Ahead;
+use crate::fault::Faults;
 use crate::{
-    BusFigures, BusLoop, Ghost, GhostReport, Metrics, Plant, Scenario, SimError, SimTruck, Summary,
-    Traffic, Truck,
+    BusFigures, BusLoop, Fault, Ghost, GhostReport, Metrics, Plant, Scenario, SimError, SimTruck,
+    Simulated, StackChange, Summary, Traffic, Truck,
 };
 
 /// Whether a run goes on.
@@ -39,6 +42,9 @@ pub struct World {
     ghost: Option<Box<Ghost>>,
     /// Sensors change what the stack sees of the traffic.
     sensors: bool,
+    faults: Faults,
+    /// File of weights of the learned decider.
+    policy_file: Option<String>,
 }
 
 /// Measures a tick, unless the stack gets another state or scene than the true ones: then
@@ -106,7 +112,15 @@ impl World {
         let policy = scenario.policy_file.as_deref().map(Path::new);
         let stack = stack_of(config, limits, policy)?;
         let sensors = scenario.traffic.perception.enabled;
-        Ok(Self { plant: plant.map_truck(Truck::Direct), stack, ghost: None, sensors })
+        let policy_file = scenario.policy_file.clone();
+        Ok(Self {
+            plant: plant.map_truck(Truck::Direct),
+            stack,
+            ghost: None,
+            sensors,
+            faults: Faults::default(),
+            policy_file,
+        })
     }
 
     /// One tick of the loop: reads the truck at the present time, plans, commands, records, and
@@ -120,20 +134,25 @@ impl World {
         }
         let (now, road) = (self.plant.now(), self.plant.limited_road());
         let Plant { truck, traffic, metrics, .. } = &mut self.plant;
-        let measures = !self.sensors && !matches!(truck, Truck::Bus(_));
+        let deceived = self.faults.deceive();
+        let measures = !self.sensors && !deceived && !matches!(truck, Truck::Bus(_));
         let mut judge = Judge { metrics, measures, scene: None };
+        let there = Cell::new(None);
+        let (mut seen_truck, mut seen_traffic) = self.faults.between(truck, traffic, &there);
         let outcome = planner::drive_tick(
             now,
-            truck,
-            traffic,
+            &mut seen_truck,
+            &mut seen_traffic,
             &mut self.stack,
             &road,
             &mut (&mut judge, recorder),
         )
         .map_err(SimError::from)?;
         let seen = judge.scene;
-        if let Some(scene) = traffic.truth().or(seen.as_ref()).filter(|_| !measures) {
-            let ego = *truck.truth().unwrap_or(&outcome.ego.value);
+        let real = traffic.truth().or(self.faults.real_scene()).or(seen.as_ref());
+        if let Some(scene) = real.filter(|_| !measures) {
+            let read = outcome.ego.value;
+            let ego = if deceived { *truck.sim().state() } else { *truck.truth().unwrap_or(&read) };
             metrics.record(&Tick { now, ego: &ego, scene, plan: self.stack.plan() });
             truck.see(Ahead::of(&ego, &truck.limits().geometry, scene));
         }
@@ -141,6 +160,42 @@ impl World {
             ghost.follow(now, self.plant.truck().state(), self.stack.plan().held_up);
         }
         Ok(self.plant.end_tick())
+    }
+
+    /// Changes the stack, before the next tick. Who records the run records the change.
+    ///
+    /// # Errors
+    /// As [`StackChange::apply`].
+    pub fn change(&mut self, change: &StackChange) -> Result<(), SimError> {
+        change.apply(&mut self.stack)?;
+        if let StackChange::Decider { policy_file: Some(file), .. } = change {
+            self.policy_file = Some(file.clone());
+        }
+        Ok(())
+    }
+
+    /// The scenario with what was changed about the stack since: one that begins here is this one.
+    #[must_use]
+    pub fn scenario_now(&self) -> Scenario {
+        let mut now = self.scenario().clone();
+        let config = self.stack.config();
+        (now.stack.decider, now.stack.speed_planner) = (config.decider, config.speed_planner);
+        let learned = config.decider == DeciderKind::Dqn;
+        now.policy_file = self.policy_file.clone().filter(|_| learned);
+        now
+    }
+
+    /// Breaks something, or mends it, before the next tick.
+    ///
+    /// # Errors
+    /// [`SimError::NoBus`] for what only a truck on a bus has.
+    pub fn set_fault(&mut self, fault: Fault, is_on: bool) -> Result<(), SimError> {
+        self.faults.set(fault, is_on, &mut self.plant.truck)
+    }
+
+    /// What is broken.
+    pub fn faults(&self) -> impl Iterator<Item = Fault> {
+        self.faults.iter()
     }
 
     /// What the next tick will see, with tactics that have looked ahead from there: for who decides

@@ -55,6 +55,8 @@ pub struct GuardConfig {
     pub ego_age_max_s: f64,
     /// Oldest usable scene, s.
     pub scene_age_max_s: f64,
+    /// Oldest usable demand of who drives from outside, s.
+    pub demand_age_max_s: f64,
     /// A moving truck's position may stay the same for so long, s.
     pub frozen_max_s: f64,
     /// Largest plausible acceleration, m/s².
@@ -78,6 +80,7 @@ impl Default for GuardConfig {
         Self {
             ego_age_max_s: 0.15,
             scene_age_max_s: 0.5,
+            demand_age_max_s: 0.2,
             frozen_max_s: 0.3,
             accel_max_m_s2: 12.0,
             jump_max_m: 2.0,
@@ -98,6 +101,7 @@ impl GuardConfig {
     pub fn check(&self) -> Result<(), PlannerError> {
         config_in("guard.ego_age_max_s", self.ego_age_max_s, 0.01, 2.0)?;
         config_in("guard.scene_age_max_s", self.scene_age_max_s, 0.01, 5.0)?;
+        config_in("guard.demand_age_max_s", self.demand_age_max_s, 0.02, 2.0)?;
         config_in("guard.frozen_max_s", self.frozen_max_s, 0.02, 5.0)?;
         config_in("guard.accel_max_m_s2", self.accel_max_m_s2, 5.0, 100.0)?;
         config_in("guard.jump_max_m", self.jump_max_m, 0.1, 100.0)?;
@@ -143,7 +147,20 @@ pub(crate) struct Inspection {
     pub reasons: Reasons,
 }
 
-/// Looks at the inputs of a tick. `ego` and `scene_time` are `None` when their seam failed.
+/// The inputs of a tick.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Inputs<'a> {
+    /// The truck's state; `None`: its seam failed.
+    pub ego: Option<&'a Stamped<EgoState>>,
+    /// What is wrong with the truck.
+    pub status: &'a VehicleStatus,
+    /// Time of the scene; `None`: its seam failed.
+    pub scene_time: Option<Time>,
+    /// Time of the last demand of who drives from outside; `None`: nobody does.
+    pub demand_time: Option<Time>,
+}
+
+/// Looks at the inputs of a tick.
 ///
 /// A truck whose engine, gearbox or brakes are silent can still be steered to its stop: only the
 /// signals that steer make the ego state unusable.
@@ -152,10 +169,9 @@ pub(crate) fn inspect(
     config: &GuardConfig,
     memory: &GuardMemory,
     now: Time,
-    ego: Option<&Stamped<EgoState>>,
-    status: &VehicleStatus,
-    scene_time: Option<Time>,
+    inputs: &Inputs<'_>,
 ) -> (Inspection, GuardMemory) {
+    let Inputs { ego, status, scene_time, demand_time } = *inputs;
     let mut next = *memory;
     let mut reasons = Reasons::default();
     match ego {
@@ -196,6 +212,9 @@ pub(crate) fn inspect(
             reasons.insert(GuardReason::Stale);
         }
         Some(_) => {}
+    }
+    if demand_time.is_some_and(|t| now.seconds_since(t).abs() > config.demand_age_max_s) {
+        reasons.insert(GuardReason::Stale);
     }
     for fault in status.faults() {
         reasons.insert(reason_of(fault.fault));

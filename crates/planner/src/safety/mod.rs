@@ -17,6 +17,6 @@ mod surroundings;
 pub use gate::{Gate, GateView};
 pub(crate) use gate::{SpeedCourse, Strictness};
 pub use guard::GuardConfig;
-pub(crate) use guard::{GuardInput, GuardMemory, Headway, inspect, limit};
+pub(crate) use guard::{GuardInput, GuardMemory, Headway, Inputs, inspect, limit};
 pub use rss::{RearResponse, RssConfig, SafeGap};
 pub(crate) use surroundings::{EgoExtent, ahead, behind, in_lane, reaches};

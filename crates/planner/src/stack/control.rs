@@ -3,7 +3,7 @@
 use super::StackConfig;
 use super::gear::{Doing, PlannedGear};
 use super::tactics::{TacticalPlan, Tactics};
-use crate::speed::{KeptGear, LongitudinalController};
+use crate::speed::{KeptGear, LongitudinalController, SpeedTarget};
 use crate::steering::{
     LOWEST_SPEED_M_S, LateralController, LateralPath, PREVIEW_POINTS, PREVIEW_STEP_S, PathError,
 };
@@ -80,6 +80,26 @@ impl Control {
             accel_m_s2: speed.accel_m_s2,
             traffic_rules: speed.traffic_rules,
             offset_m: error.offset_m,
+        }
+    }
+
+    /// One step of a demand from outside.
+    pub(super) fn obey(
+        &mut self,
+        dt_s: f64,
+        road_wheel_rad: f64,
+        target: &SpeedTarget,
+        at: &Situation<'_>,
+    ) -> Command {
+        let Situation { ego, limits, .. } = *at;
+        let speed = self.longitudinal.step(dt_s, ego, target, limits);
+        Command {
+            accelerator_pedal_frac: speed.accelerator_pedal_frac,
+            xbr_decel_m_s2: speed.xbr_decel_m_s2,
+            brake_mode: speed.brake_mode,
+            steering_wheel_rad: road_wheel_rad * limits.lateral.steering_ratio,
+            retarder_frac: speed.retarder_frac,
+            gear: GearRequest::Automatic,
         }
     }
 

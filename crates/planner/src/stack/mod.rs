@@ -4,6 +4,8 @@
 //! |---|---|
 //! | `mod` | the stack of one truck, a tick with its guard |
 //! | `config` | what a user may set |
+//! | `settings` | what may be set while it drives |
+//! | `outside` | demands of who drives in its place |
 //! | `tactics` | what to drive: lane changes, car following, reference speed |
 //! | `decide` | the decision of a tick, and what a learned decider sees |
 //! | `speed` | the predictive speed planner in the stack |
@@ -14,10 +16,13 @@ mod config;
 mod control;
 mod decide;
 mod gear;
+mod outside;
+mod settings;
 mod speed;
 mod tactics;
 
 pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};
+pub use outside::OutsideDemand;
 pub use tactics::{TacticalPlan, Tactics};
 
 use alloc::sync::Arc;
@@ -25,10 +30,10 @@ use alloc::vec::Vec;
 
 use crate::decider::{DeciderKind, LaneChoice, Policy};
 use crate::pcc::horizon::{HorizonFailure, HorizonPlan};
-use crate::safety::{GuardInput, GuardMemory, inspect, limit};
+use crate::safety::{GuardInput, GuardMemory, Inputs, inspect, limit};
 use crate::speed::{LoadEstimate, LoadEstimator};
 use crate::steering::LateralPath;
-use crate::{PlannerError, Situation, SpeedProfile};
+use crate::{PlannerError, Situation};
 use control::Control;
 use road::Road;
 use tractrix_core::{
@@ -53,6 +58,8 @@ pub struct Stack {
     estimator: LoadEstimator,
     /// The truck's limits with the estimated load, once there is a valid estimate.
     estimated: Option<VehicleLimits>,
+    /// Who drives from outside has asked for this.
+    demand: Option<OutsideDemand>,
     plan: Plan,
 }
 
@@ -108,6 +115,7 @@ impl Stack {
             believed: EgoState::default(),
             estimator: LoadEstimator::new(estimator, &limits.road_load),
             estimated: None,
+            demand: None,
             plan: Plan::default(),
         })
     }
@@ -136,21 +144,6 @@ impl Stack {
         self.estimator.estimate()
     }
 
-    /// Sets the driver's set speed, m/s, clamped to 0..40; a non-finite value is ignored.
-    pub fn set_speed(&mut self, speed_m_s: f64) {
-        if speed_m_s.is_finite() {
-            self.tactics.config.set_speed_m_s = speed_m_s.clamp(0.0, 40.0);
-        }
-    }
-
-    /// Gives the stack a speed profile that was planned ahead of time (speed planner `predictive`,
-    /// the paper's way); it replaces the former one and planning while driving. Where it has no
-    /// speed the set speed is the reference and the plan's status is
-    /// [`tractrix_core::PlanStatus::Fallback`]. `None` goes back to planning while driving.
-    pub fn set_speed_profile(&mut self, profile: Option<SpeedProfile>) {
-        self.tactics.profile = profile;
-    }
-
     /// The last plan of the predictive speed planner, made while driving.
     #[must_use]
     pub fn speed_plan(&self) -> Option<&HorizonPlan> {
@@ -173,11 +166,6 @@ impl Stack {
     #[must_use]
     pub fn speed_plan_late_s(&self) -> f64 {
         self.tactics.speed.late_s()
-    }
-
-    /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick.
-    pub fn request_lane_change(&mut self, wish: LaneChoice) {
-        self.tactics.request_lane_change(wish);
     }
 
     /// The lane change that is wished from outside and was not looked at yet.
@@ -225,8 +213,9 @@ impl Stack {
         let tick_s = self.config().rates.tick_s;
         let dt_s = self.last_tick.map_or(tick_s, |t| now.seconds_since(t)).clamp(0.0, 0.5);
         self.last_tick = Some(now);
-        let (inspection, memory) =
-            inspect(&self.config().guard, &self.guard, now, ego, status, scene.map(|s| s.time));
+        let (scene_time, demand_time) = (scene.map(|s| s.time), self.demand.map(|d| d.time));
+        let inputs = Inputs { ego, status, scene_time, demand_time };
+        let (inspection, memory) = inspect(&self.config().guard, &self.guard, now, &inputs);
         self.guard = memory;
         match ego {
             Some(ego) if inspection.ego_usable => self.believed = ego.value,
@@ -237,11 +226,16 @@ impl Stack {
         let scene = scene.unwrap_or(&empty);
 
         self.plan.refusal = None;
+        let demand = self.demand.filter(|_| !inspection.minimal_risk);
         let planned = if inspection.ego_usable && !inspection.driver {
             self.estimate_load(dt_s, &ego, road, limits);
             let estimated = self.estimated.take();
             let known = estimated.as_ref().unwrap_or(limits);
-            let planned = self.drive(&Situation { now, ego: &ego, scene, road, limits: known });
+            let at = Situation { now, ego: &ego, scene, road, limits: known };
+            let planned = match demand {
+                Some(demand) => Some(self.obey(&demand, &at)),
+                None => self.drive(&at),
+            };
             self.estimated = estimated;
             planned
         } else {
@@ -252,6 +246,7 @@ impl Stack {
         let lateral = &self.control.lateral;
         let steady =
             lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);
+        let at = Situation { now, ego: &ego, scene, road, limits };
         let input = GuardInput {
             dt_s,
             speed_m_s: ego.speed_m_s,
@@ -259,7 +254,10 @@ impl Stack {
             keep_lane_wheel_rad: steady * limits.lateral.steering_ratio,
             minimal_risk: inspection.minimal_risk,
             driver_wheel_rad: inspection.driver.then_some(ego.steering_wheel_rad),
-            headway: self.tactics.headway(&Situation { now, ego: &ego, scene, road, limits }),
+            headway: match demand {
+                Some(_) => self.tactics.headway_of_others(&at),
+                None => self.tactics.headway(&at),
+            },
         };
         let (guarded, memory) = limit(&self.config().guard, &self.guard, &input, limits);
         self.guard = memory;
@@ -269,6 +267,8 @@ impl Stack {
         if guarded.minimal_risk || inspection.driver {
             self.plan.maneuver =
                 if inspection.driver { Maneuver::KeepLane } else { Maneuver::MinimalRisk };
+        }
+        if guarded.minimal_risk || inspection.driver || demand.is_some() {
             self.control
                 .lateral
                 .overridden(guarded.command.steering_wheel_rad / limits.lateral.steering_ratio);

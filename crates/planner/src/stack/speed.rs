@@ -62,6 +62,11 @@ impl SpeedPlanning {
         }
     }
 
+    /// As [`Self::new`], with the attempts counted on.
+    pub(super) fn anew(&self, config: &StackConfig) -> Self {
+        Self { made: self.made, ..Self::new(config) }
+    }
+
     /// Why the last attempt brought no plan.
     pub(super) fn failure(&self) -> Option<&HorizonFailure> {
         self.failure.as_ref()

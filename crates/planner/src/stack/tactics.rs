@@ -173,6 +173,32 @@ impl Tactics {
         &self.config
     }
 
+    /// As [`crate::Stack::set_decider`].
+    pub(super) fn set_decider(
+        &mut self,
+        decider: DeciderKind,
+        policy: Option<Arc<Policy>>,
+    ) -> Result<(), PlannerError> {
+        decider.check()?;
+        let policy = policy.or_else(|| self.policy.clone());
+        if decider == DeciderKind::Dqn && policy.is_none() {
+            return Err(PlannerError::NoPolicy);
+        }
+        self.scratch = policy.as_ref().map(|p| p.scratch()).unwrap_or_default();
+        (self.config.decider, self.policy, self.wish) = (decider, policy, LaneChoice::Keep);
+        Ok(())
+    }
+
+    /// As [`crate::Stack::set_speed_planner`].
+    pub(super) fn set_speed_planner(&mut self, kind: SpeedPlannerKind) {
+        if kind != self.config.speed_planner {
+            self.config.speed_planner = kind;
+            self.speed = self.speed.anew(&self.config);
+            // What is known of the road ahead is of the other one
+            self.foreseen = None;
+        }
+    }
+
     /// Wishes a lane change from outside (decider `external`); it is looked at in the next tick
     /// that looks at paths.
     pub fn request_lane_change(&mut self, wish: LaneChoice) {
@@ -207,11 +233,10 @@ impl Tactics {
     pub fn foresee(&mut self, at: &Situation<'_>) -> bool {
         let maneuver = match self.maneuver.take() {
             Some(maneuver) => maneuver,
-            None => {
-                let Some(lane) = start_lane(at.road, at.ego) else { return false };
-                let path = join_from(at.road, lane, at.ego);
-                ManeuverPlanner::new(self.config.lane_change, self.config.rss, path)
-            }
+            None => match self.joining(at) {
+                Some(maneuver) => maneuver,
+                None => return false,
+            },
         };
         let due = self.ticks.is_multiple_of(u64::from(self.config.rates.path_ticks));
         let known = self.foreseen == Some(self.ticks);
@@ -332,9 +357,32 @@ impl Tactics {
         self.reference.points()
     }
 
+    /// Into the lane where the truck is; `None` if there is none to drive in.
+    fn joining(&self, at: &Situation<'_>) -> Option<ManeuverPlanner> {
+        let path = join_from(at.road, start_lane(at.road, at.ego)?, at.ego);
+        Some(ManeuverPlanner::new(self.config.lane_change, self.config.rss, path))
+    }
+
     /// The vehicle in the path with the least time to spare, for the guard.
     pub(super) fn headway(&self, at: &Situation<'_>) -> Option<Headway> {
-        leads(&self.lead_view(at), self.maneuver.as_ref()?)
+        self.headway_on(self.maneuver.as_ref()?, at)
+    }
+
+    /// As [`Self::headway`], where somebody else drives: in the lane where the truck is.
+    pub(super) fn headway_of_others(&self, at: &Situation<'_>) -> Option<Headway> {
+        self.headway_on(&self.joining(at)?, at)
+    }
+
+    /// What car following asks of whoever drives in the lane where the truck is, and whom it
+    /// follows.
+    pub(super) fn following_of_others(&self, at: &Situation<'_>) -> Option<(u64, Following)> {
+        let leads = leads(&self.lead_view(at), &self.joining(at)?);
+        let response = self.config.rss.ego_response(at.limits);
+        self.follow(&leads, &response, at.ego.speed_m_s, grade(at.road, at.ego, at.limits))
+    }
+
+    fn headway_on(&self, maneuver: &ManeuverPlanner, at: &Situation<'_>) -> Option<Headway> {
+        leads(&self.lead_view(at), maneuver)
             .into_iter()
             .flatten()
             .filter(|lead| lead.in_path)

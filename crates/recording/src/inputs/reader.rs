@@ -14,7 +14,7 @@ use super::step::GivenStep;
 use crate::error::RecordingError;
 use crate::records::{Records, attachment_is_whole};
 use crate::ros::input::{BusTick, CanFrame};
-use crate::topic::{CAN_FRAMES, CAN_TICKS, INPUT, LIMITS, Topic, VEHICLES};
+use crate::topic::{CAN_FRAMES, CAN_TICKS, CHANGES, INPUT, LIMITS, Topic, VEHICLES};
 use crate::writer::GAP_RECORD;
 
 /// Record of names and values about the bus, and its key of what the driver is set up with.
@@ -56,6 +56,7 @@ enum Kind {
     Input,
     Vehicles,
     Limits,
+    Changes,
     Frames,
     Ticks,
 }
@@ -73,6 +74,7 @@ pub struct Inputs {
     scenes: SceneReader,
     vehicles: Vec<Neighbour>,
     limits: Option<Box<VehicleLimits>>,
+    changes: Vec<String>,
     call: BusCall,
     steps: VecDeque<GivenStep>,
     calls: VecDeque<BusCall>,
@@ -99,6 +101,7 @@ impl Inputs {
             scenes: SceneReader::default(),
             vehicles: Vec::new(),
             limits: None,
+            changes: Vec::new(),
             call: BusCall::default(),
             steps: VecDeque::new(),
             calls: VecDeque::new(),
@@ -214,8 +217,9 @@ impl Inputs {
         match kind {
             Kind::Input => {
                 let input = INPUT.decode(cdr)?;
-                let limits = self.limits.take();
-                self.steps.push_back(input.step(&self.vehicles, limits)?);
+                let step = input.step(&self.vehicles, self.limits.take())?;
+                let changes = std::mem::take(&mut self.changes);
+                self.steps.push_back(GivenStep { changes, ..step });
             }
             Kind::Vehicles => {
                 self.vehicles = self.scenes.read(&VEHICLES.decode(cdr)?.differences)?;
@@ -224,6 +228,7 @@ impl Inputs {
                 let sheet = LIMITS.decode(cdr)?.sheet_toml;
                 self.limits = Some(Box::new(VehicleLimits::from_sheet("limits", &sheet).ok()?));
             }
+            Kind::Changes => self.changes.push(CHANGES.decode(cdr)?.change_toml),
             Kind::Frames if self.with_bus => self.frame(&CAN_FRAMES.decode(cdr)?)?,
             Kind::Ticks if self.with_bus => self.end_call(CAN_TICKS.decode(cdr)?)?,
             Kind::Frames | Kind::Ticks => {}
@@ -256,7 +261,13 @@ impl Inputs {
 /// What a topic carries, and how it is defined.
 fn kind_of(topic: &str) -> Option<(Kind, Topic)> {
     let of_bus = |end: &str| topic.starts_with("/can/") && topic.ends_with(end);
-    [(INPUT.topic, Kind::Input), (VEHICLES.topic, Kind::Vehicles), (LIMITS.topic, Kind::Limits)]
+    let known = [
+        (INPUT.topic, Kind::Input),
+        (VEHICLES.topic, Kind::Vehicles),
+        (LIMITS.topic, Kind::Limits),
+        (CHANGES.topic, Kind::Changes),
+    ];
+    known
         .into_iter()
         .find(|(known, _)| known.name == topic)
         .or_else(|| of_bus("/frames").then_some((CAN_FRAMES.topic, Kind::Frames)))

@@ -30,6 +30,8 @@ pub struct GivenStep {
     pub set_speed_m_s: f64,
     /// The lane change that was wished from outside.
     pub wish: LaneChoice,
+    /// Changes of the stack since the step before, in words.
+    pub changes: Vec<String>,
     /// The command of the stack.
     pub command: Command,
 }
@@ -170,6 +172,7 @@ impl StackInput {
                 1 => LaneChoice::Right,
                 _ => return None,
             },
+            changes: Vec::new(),
             command: Command {
                 accelerator_pedal_frac: self.accelerator_pedal_frac,
                 xbr_decel_m_s2: self.xbr_decel_m_s2,
@@ -297,6 +300,7 @@ mod tests {
                 limit_cap_m_s: step.limit_cap_m_s,
                 set_speed_m_s: step.set_speed_m_s,
                 wish: step.wish,
+                changes: Vec::new(),
                 command,
             }
         );

@@ -71,6 +71,13 @@ pub(crate) struct StackLimits {
     pub(crate) sheet_toml: String,
 }
 
+/// `truck_msgs/msg/StackChange`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct StackChange {
+    pub(crate) now_ns: i64,
+    pub(crate) change_toml: String,
+}
+
 /// `truck_msgs/msg/BusTick`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct BusTick {
@@ -104,6 +111,7 @@ names! {
     StackInput: "truck_msgs" / "StackInput";
     StackScene: "truck_msgs" / "StackScene";
     StackLimits: "truck_msgs" / "StackLimits";
+    StackChange: "truck_msgs" / "StackChange";
     BusTick: "truck_msgs" / "BusTick";
     CanFrame: "can_msgs" / "Frame";
 }

@@ -97,6 +97,7 @@ const DEFINITIONS: &[(&str, &str)] = &[
     ("truck_msgs/StackInput", include_str!("../../msg/truck_msgs/msg/StackInput.msg")),
     ("truck_msgs/StackScene", include_str!("../../msg/truck_msgs/msg/StackScene.msg")),
     ("truck_msgs/StackLimits", include_str!("../../msg/truck_msgs/msg/StackLimits.msg")),
+    ("truck_msgs/StackChange", include_str!("../../msg/truck_msgs/msg/StackChange.msg")),
     ("truck_msgs/BusTick", include_str!("../../msg/truck_msgs/msg/BusTick.msg")),
 ];
 

@@ -6,18 +6,17 @@ use clap::{Parser, ValueEnum};
 use j1939::bus::Bus;
 use j1939::steering::ExampleSteering;
 use j1939::truck::BusTruck;
-use planner::{DriveError, Stack, drive_tick};
+use planner::DriveError;
 use recording::{BusCall, DriverWish, GivenStep, Inputs};
 use serde::Serialize;
-use tractrix_core::{Command, PoseSource, Time, Vehicle, VehicleLimits};
+use tractrix_core::{Command, PoseSource, Time, Vehicle};
 
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::Stages;
 use crate::provenance::Provenance;
 use crate::replayed::{
-    AsRecorded, Comparison, Difference, RecordedBus, RecordedPose, RecordedTraffic,
-    RecordedVehicle, Setup, driver_setup,
+    Again, Comparison, Difference, RecordedBus, RecordedPose, Setup, driver_setup,
 };
 
 /// Drives the stack again with what it was given in a recording, and compares every command bit for
@@ -99,62 +98,38 @@ fn replay(args: &Args, stages: &Stages) -> Result<(Provenance, Comparison), Fail
         let why = format!("it goes on from a snapshot at {time_s} s: its stack was not new then");
         return Err(Failure::file(&args.file, why));
     }
-    let mut setup = Setup::new(&args.file, &about, &args.set, args.road.as_deref())?;
+    let setup = Setup::new(&args.file, &about, &args.set, args.road.as_deref())?;
+    let mut again = Again::new(&args.file, setup);
     let seed = about.value("run", "seed").and_then(|seed| seed.parse().ok());
     let mut comparison = Comparison::default();
-    let mut drive: Option<(Stack, VehicleLimits, Option<Driver>)> = None;
-    let mut set_speed_m_s = None;
+    let mut driver: Option<Driver> = None;
     while let Some(mut step) = inputs.next_step()? {
-        let limits = step.limits.take();
-        let (stack, limits, driver) = match (&mut drive, limits) {
-            (Some(drive), None) => drive,
-            (Some(drive), Some(now)) => {
-                drive.1 = *now;
-                drive
-            }
-            (none, Some(limits)) => {
-                let driver = match args.from {
-                    From::Ego => None,
-                    From::Frames => {
-                        let (bus, pose) = (RecordedBus::default(), RecordedPose::of(&step));
-                        let setup = driver_setup(&args.file, &about)?;
-                        let driver = setup.driver(bus, pose, (*limits).clone());
-                        Some(driver.map_err(Failure::input)?)
-                    }
-                };
-                none.insert((setup.stack(&limits)?, *limits, driver))
-            }
-            (None, None) => return Err(Failure::file(&args.file, "it has no /stack/limits")),
-        };
-        // What was set before the first step is in the configuration, which may be changed
-        if set_speed_m_s.replace(step.set_speed_m_s).is_some_and(|was| was != step.set_speed_m_s) {
-            stack.set_speed(step.set_speed_m_s);
+        let (now, is_first) = (step.now, comparison.ticks == 0);
+        let recorded = step.clone();
+        let prepared = again.prepare(&mut step)?;
+        if args.from == From::Frames && driver.is_none() {
+            let (bus, pose) = (RecordedBus::default(), RecordedPose::of(&recorded));
+            let setup = driver_setup(&args.file, &about)?;
+            let new = setup.driver(bus, pose, prepared.limits.clone());
+            driver = Some(new.map_err(Failure::input)?);
         }
-        if stack.wish() != step.wish {
-            stack.request_lane_change(step.wish);
-        }
-        let road = setup.road(step.limit_cap_m_s);
-        comparison.expect(step.clone());
-        let (now, traffic) = (step.now, &mut RecordedTraffic(&step));
-        if let Some(driver) = driver {
-            if !read_bus(driver, &mut inputs, &step, comparison.ticks == 0, args)? {
+        comparison.expect(recorded.clone());
+        if let Some(driver) = &mut driver {
+            if !read_bus(driver, &mut inputs, &recorded, is_first, args)? {
                 output::note("the recording ends before the frames of its last steps");
                 break;
             }
-            let driven = drive_tick(now, driver, traffic, stack, &road, &mut comparison);
+            let driven = prepared.drive_with(driver, &mut comparison);
             if let Err(DriveError::Command(why)) = driven {
                 return Err(Failure::work(why));
             }
             if let Some(frame) = driver.bus().unheard_of.take() {
                 let (id, data) = (frame.id, frame.data);
                 let sent = format!("{id:08X}#{:016X}", u64::from_be_bytes(data));
-                comparison.note(&step, "frame sent", "another or none", &sent);
+                comparison.note(&recorded, "frame sent", "another or none", &sent);
             }
         } else {
-            let vehicle = &mut RecordedVehicle { step: &step, limits };
-            // Who failed in the run fails here, and the stack has dealt with it
-            let _: Result<_, DriveError<AsRecorded, AsRecorded>> =
-                drive_tick(now, vehicle, traffic, stack, &road, &mut comparison);
+            prepared.drive(&mut comparison);
         }
         if comparison.ticks.is_multiple_of(1000) {
             stages.show(&format!("{:.0} s compared", now.seconds()));

@@ -6,6 +6,7 @@ use serde::Serialize;
 use sim::Summary;
 use tractrix_core::{GuardReason, LaneChangeReason, LaneChangeRefusal, Maneuver, Plan, Tick};
 
+use super::settings::Settings;
 use super::strip::round;
 use crate::session::RunState;
 
@@ -37,6 +38,8 @@ pub(super) enum What {
     Refusal { refusal: LaneChangeRefusal, reason: Option<LaneChangeReason> },
     /// The guard changes commands for these reasons; none: no more.
     Guard { reasons: Vec<GuardReason> },
+    /// The stack is set otherwise, or something is broken or mended.
+    Settings(Settings),
     /// A wheel went off the road.
     OffRoad { events: u32 },
     /// The truck touched something.
@@ -78,6 +81,7 @@ pub(super) struct Watcher {
     off_road: u32,
     collisions: u32,
     state: Option<RunState>,
+    settings: Option<Settings>,
 }
 
 /// A wish that is refused again within so many ticks is the same one.
@@ -122,6 +126,14 @@ impl Watcher {
         }
         if self.state.replace(state) != Some(state) {
             log.add(time_s, What::State { state });
+        }
+    }
+
+    /// How the run is set; how it began is no event.
+    pub(super) fn settings(&mut self, time_s: f64, now: Settings, log: &mut EventLog) {
+        let was = self.settings.replace(now.clone());
+        if was.is_some_and(|was| was != now) {
+            log.add(time_s, What::Settings(now));
         }
     }
 }

@@ -9,6 +9,7 @@ use tractrix_core::{
 };
 
 use super::ahead::{Lead, SpeedAhead};
+use super::settings::Settings;
 use super::strip::round;
 use crate::provenance::Provenance;
 use crate::session::{Pace, RunState};
@@ -43,6 +44,8 @@ pub(super) struct Run<'a> {
     pub(super) state: RunState,
     /// Lane changes are wished from outside.
     pub(super) external_decider: bool,
+    #[serde(flatten)]
+    pub(super) settings: Settings,
     pub(super) pace: Pace,
     /// Simulated seconds per second since the last frame but a few.
     pub(super) realtime_factor: f64,

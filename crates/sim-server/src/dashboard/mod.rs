@@ -26,6 +26,7 @@ mod run_report;
 mod runs;
 mod server;
 mod sessions;
+mod settings;
 mod socket;
 mod strip;
 

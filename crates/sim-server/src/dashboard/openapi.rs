@@ -208,6 +208,29 @@ pub(super) enum CommandObject {
         #[schema(minimum = 0, maximum = 40)]
         speed_m_s: f64,
     },
+    /// Another decider from here on.
+    SetDecider {
+        /// `keep`, `rules:METRES` (5 to 500), `mobil`, `rollout`, `dqn` or `external`.
+        #[schema(
+            pattern = "^(keep|mobil|rollout|dqn|external|rules:([5-9]|[1-9][0-9]|[1-4][0-9]{2}))$"
+        )]
+        decider: String,
+    },
+    /// Another source of the reference speed from here on.
+    SetSpeedPlanner { speed_planner: SpeedPlannerWord },
+    /// Somebody else drives: without another command within 0.2 s the truck stops in its lane.
+    External {
+        /// Acceleration along the road, m/s².
+        #[schema(minimum = -10, maximum = 5)]
+        accel_m_s2: f64,
+        /// Angle of the front wheels, rad; positive: to the left.
+        #[schema(minimum = -1, maximum = 1)]
+        road_wheel_rad: f64,
+    },
+    /// Nobody else drives any more.
+    Release {},
+    /// Breaks something, or mends it. All but the first two need a truck on a bus.
+    Fault { fault: FaultWord, on: bool },
     /// Ends the run and the session, with `default` the program too.
     Quit {},
 }
@@ -232,6 +255,30 @@ pub(super) struct Factor(f64);
 pub(super) enum PaceWord {
     Realtime,
     Max,
+}
+
+#[derive(ToSchema)]
+#[schema(rename_all = "snake_case")]
+#[expect(dead_code, reason = "a schema")]
+pub(super) enum SpeedPlannerWord {
+    Cruise,
+    Predictive,
+}
+
+#[derive(ToSchema)]
+#[schema(rename_all = "snake_case")]
+#[expect(dead_code, reason = "a schema")]
+pub(super) enum FaultWord {
+    Localisation,
+    Perception,
+    WheelSpeeds,
+    Engine,
+    Transmission,
+    Brakes,
+    Steering,
+    Retarder,
+    Radar,
+    Cab,
 }
 
 #[derive(ToSchema)]

@@ -3,11 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use planner::{DriveError, Stack, drive_tick};
 use recording::{Combination, Inputs};
 use road::Road;
 use serde::Serialize;
-use tractrix_core::{Recorder, Tick, Time, VehicleLimits};
+use tractrix_core::{Recorder, Tick, Time};
 
 use super::ahead::{Lead, SpeedAhead};
 use super::frame::{Ego, Frame, Here, Other, Planned, Refused, Snapshot};
@@ -15,7 +14,7 @@ use super::road_json;
 use super::strip::{Strip, round};
 use crate::failure::Failure;
 use crate::provenance::Provenance;
-use crate::replayed::{AsRecorded, RecordedTraffic, RecordedVehicle, Setup};
+use crate::replayed::{Again, Setup};
 use crate::run_folder::FoundRun;
 
 /// Simulated time between two frames, s; more in runs that are longer than an hour.
@@ -91,7 +90,7 @@ impl Playback {
     pub(crate) fn load(file: &Path, name: &str) -> Result<Self, Failure> {
         let mut inputs = Inputs::open(file, false)?;
         let about = inputs.about().clone();
-        let mut setup = Setup::new(file, &about, &[], None)?;
+        let mut again = Again::new(file, Setup::new(file, &about, &[], None)?);
         let seed = about.value("run", "seed").and_then(|seed| seed.parse().ok());
         let mut keeper = Keeper {
             period_s: PERIOD_S,
@@ -101,55 +100,33 @@ impl Playback {
             last_refusal: None,
             strip: Strip::default(),
         };
-        let mut drive: Option<(Stack, VehicleLimits)> = None;
-        let mut set_speed_m_s = None;
         let mut ticks_different = 0;
         // The end of a torn recording is where it was torn
         while let Ok(Some(mut step)) = inputs.next_step() {
-            let limits = step.limits.take();
-            let (stack, limits) = match (&mut drive, limits) {
-                (Some(drive), None) => drive,
-                (Some(drive), Some(now)) => {
-                    drive.1 = *now;
-                    drive
-                }
-                (none, Some(limits)) => none.insert((setup.stack(&limits)?, *limits)),
-                (None, None) => return Err(Failure::file(file, "it has no /stack/limits")),
-            };
-            let was = set_speed_m_s.replace(step.set_speed_m_s);
-            if was.is_some_and(|was| was != step.set_speed_m_s) {
-                stack.set_speed(step.set_speed_m_s);
-            }
-            if stack.wish() != step.wish {
-                stack.request_lane_change(step.wish);
-            }
-            let road = setup.road(step.limit_cap_m_s);
-            let vehicle = &mut RecordedVehicle { step: &step, limits };
-            let traffic = &mut RecordedTraffic(&step);
-            let _: Result<_, DriveError<AsRecorded, AsRecorded>> =
-                drive_tick(step.now, vehicle, traffic, stack, &road, &mut keeper);
+            again.prepare(&mut step)?.drive(&mut keeper);
+            let Some((stack, _)) = again.driven() else { continue };
             ticks_different += u64::from(stack.plan().command != step.command);
             if let Some(kept) = keeper.last.take() {
-                let plan = stack.speed_plan();
-                let ahead = SpeedAhead::of(&kept.plan, plan, kept.ego.s_m);
+                let ahead = SpeedAhead::of(&kept.plan, stack.speed_plan(), kept.ego.s_m);
                 keeper.frames.push((kept, step.set_speed_m_s, ahead));
                 if keeper.frames.len() > MAX_FRAMES {
                     keeper.thin_out();
                 }
             }
         }
-        let Some((_, limits)) = drive else {
+        let Some((_, limits)) = again.driven() else {
             return Err(Failure::file(file, "nothing was driven"));
         };
-        let combination = Combination::new(&limits);
-        let road = Arc::clone(setup.whole_road());
+        let combination = Combination::new(limits);
+        let front_m = limits.geometry.front_m;
+        let road = Arc::clone(again.whole_road());
         Ok(Self {
             provenance: Provenance::of_seed(seed.unwrap_or_default()),
             name: name.to_owned(),
             scenario: about.value("run", "scenario").unwrap_or_default().to_owned(),
             setting: road_json(&road, &combination),
             road,
-            front_m: limits.geometry.front_m,
+            front_m,
             frames: keeper.frames,
             strip: keeper.strip,
             ticks_different,

@@ -192,6 +192,7 @@ const fn code_of(why: &Refused) -> (StatusCode, &'static str) {
         Refused::TooMany => (StatusCode::TOO_MANY_REQUESTS, "too_many_controls"),
         Refused::Ended => (StatusCode::CONFLICT, "run_ended"),
         Refused::WrongState { .. } => (StatusCode::CONFLICT, "wrong_state"),
+        Refused::NoBus(_) => (StatusCode::CONFLICT, "no_bus"),
         Refused::NoExternalDecider => (StatusCode::CONFLICT, "no_external_decider"),
         Refused::OutsideBus(_) => (StatusCode::CONFLICT, "outside_bus"),
         Refused::OneSumo | Refused::SecondSumo => (StatusCode::CONFLICT, "one_sumo"),

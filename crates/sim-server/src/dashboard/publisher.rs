@@ -13,6 +13,7 @@ use super::Shared;
 use super::ahead::{Lead, SpeedAhead};
 use super::events::{Watcher, What};
 use super::frame::{Ego, Frame, GhostHere, Here, Other, Planned, Refused, Run, Snapshot};
+use super::settings::Settings;
 use super::strip::round;
 use crate::provenance::Provenance;
 use crate::session::{Pace, RunState};
@@ -23,7 +24,6 @@ pub(crate) struct Publisher {
     provenance: Provenance,
     run_id: String,
     scenario: String,
-    external_decider: bool,
     road: Arc<Road>,
     snapshot: Option<Snapshot>,
     watcher: Watcher,
@@ -62,7 +62,6 @@ impl Publisher {
             provenance,
             run_id,
             scenario: scenario.name.clone(),
-            external_decider: scenario.stack.decider == DeciderKind::External,
             road,
             snapshot: None,
             watcher: Watcher::default(),
@@ -79,7 +78,7 @@ impl Publisher {
             self.realtime_factor = (time_s - self.mark.1) / (wall_s - self.mark.0);
             self.mark = (wall_s, time_s);
         }
-        let (summary, ghost) = (world.summary(), world.ghost());
+        let (summary, ghost, settings) = (world.summary(), world.ghost(), Settings::of(world));
         let frame = Frame {
             provenance: self.provenance,
             kind: "frame",
@@ -88,7 +87,8 @@ impl Publisher {
             run: Run {
                 scenario: &self.scenario,
                 state,
-                external_decider: self.external_decider,
+                external_decider: world.stack().config().decider == DeciderKind::External,
+                settings: settings.clone(),
                 pace,
                 realtime_factor: round(self.realtime_factor, 100.0),
                 distance_m: round(summary.distance_m, 10.0),
@@ -123,7 +123,9 @@ impl Publisher {
         {
             *self.shared.summary() = so_far.into();
             self.shared.metrics.realtime_factor.set(self.realtime_factor);
-            self.watcher.run(time_s, state, &summary, &mut self.shared.events());
+            let events = &mut self.shared.events();
+            self.watcher.run(time_s, state, &summary, events);
+            self.watcher.settings(time_s, settings, events);
             self.shared.publish(frame.into(), state == RunState::Finished);
         }
     }

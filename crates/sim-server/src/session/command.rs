@@ -2,6 +2,7 @@
 
 use planner::decider::LaneChoice;
 use serde_json::{Map, Value};
+use sim::{Fault, StackChange};
 
 use super::{Next, Pace};
 
@@ -38,6 +39,20 @@ pub(crate) enum Command {
     },
     /// The driver's set speed, m/s, 0 to 40.
     SetSpeed(f64),
+    /// Another decider or speed planner.
+    Change(StackChange),
+    /// Somebody else drives: acceleration along the road, m/s², and angle of the front wheels, rad,
+    /// from now on. Without another one within 0.2 s the truck stops in its lane.
+    External {
+        /// Acceleration, m/s², -10 to 5.
+        accel_m_s2: f64,
+        /// Angle of the front wheels, rad, -1 to 1; positive: to the left.
+        road_wheel_rad: f64,
+    },
+    /// Nobody else drives any more.
+    Release,
+    /// Breaks something, or mends it.
+    Fault(Fault, bool),
     /// Ends the run and the session.
     Quit,
     /// Ends the run and begins another one.
@@ -70,7 +85,8 @@ pub(crate) enum CommandError {
     NotAnObject,
     #[error(
         "unknown action {0}; there are play, pause, step, step_until, pause_at, reset, stop, \
-         snapshot, restore, pace, lane_change, set_speed and quit"
+         snapshot, restore, pace, lane_change, set_speed, set_decider, set_speed_planner, external, \
+         release, fault and quit"
     )]
     UnknownAction(String),
     #[error("{action} needs {key}: {values}")]
@@ -79,6 +95,8 @@ pub(crate) enum CommandError {
     WrongValue { key: &'static str, value: String, values: &'static str },
     #[error("{action} has no key {key:?}")]
     UnknownKey { action: String, key: String },
+    #[error("{0}")]
+    Decider(String),
 }
 
 impl CommandError {
@@ -88,7 +106,7 @@ impl CommandError {
             Self::NotAnObject => "not_an_object",
             Self::UnknownAction(_) => "unknown_action",
             Self::MissingKey { .. } => "missing_key",
-            Self::WrongValue { .. } => "wrong_value",
+            Self::WrongValue { .. } | Self::Decider(_) => "wrong_value",
             Self::UnknownKey { .. } => "unknown_key",
         }
     }
@@ -147,6 +165,35 @@ impl Wish {
                 let to = take(&mut keys, "lane_change", "to", values, to)?;
                 Self::Command(Command::LaneChange { to })
             }
+            Some("set_decider") => {
+                let text = |v: &Value| v.as_str().map(str::to_owned);
+                let word = take(&mut keys, "set_decider", "decider", DECIDERS, text)?;
+                let change = StackChange::decider(&word);
+                Self::Command(Command::Change(
+                    change.map_err(|e| CommandError::Decider(e.to_string()))?,
+                ))
+            }
+            Some("set_speed_planner") => {
+                let kind = |v: &Value| serde_json::from_value(v.clone()).ok();
+                let (key, values) = ("speed_planner", "cruise or predictive");
+                let kind = take(&mut keys, "set_speed_planner", key, values, kind)?;
+                Self::Command(Command::Change(StackChange::SpeedPlanner { kind }))
+            }
+            Some("external") => Self::Command(Command::External {
+                accel_m_s2: take(&mut keys, "external", "accel_m_s2", ACCELS, |v| {
+                    v.as_f64().filter(|a| (-10.0..=5.0).contains(a))
+                })?,
+                road_wheel_rad: take(&mut keys, "external", "road_wheel_rad", WHEELS, |v| {
+                    v.as_f64().filter(|a| (-1.0..=1.0).contains(a))
+                })?,
+            }),
+            Some("release") => Self::Command(Command::Release),
+            Some("fault") => {
+                let fault = |v: &Value| v.as_str().and_then(|word| word.parse().ok());
+                let fault = take(&mut keys, "fault", "fault", FAULTS, fault)?;
+                let is_on = take(&mut keys, "fault", "on", "true or false", Value::as_bool)?;
+                Self::Command(Command::Fault(fault, is_on))
+            }
             _ => return Err(CommandError::UnknownAction(action.to_string())),
         };
         match keys.into_iter().next() {
@@ -157,6 +204,11 @@ impl Wish {
 }
 
 const TIMES: &str = "a simulation time in seconds, zero or more";
+const DECIDERS: &str = "keep, rules:METRES, mobil, rollout, dqn or external";
+const ACCELS: &str = "an acceleration in m/s2 from -10 to 5";
+const WHEELS: &str = "an angle in rad from -1 to 1";
+const FAULTS: &str = "localisation, perception, and over a bus wheel_speeds, engine, transmission, \
+                      brakes, steering, retarder, radar or cab";
 const NAMES: &str = "a name of 1 to 40 lower-case letters, digits and hyphens";
 
 fn time(value: &Value) -> Option<f64> {
@@ -200,94 +252,4 @@ fn take_optional<T>(
 fn take_wait(keys: &mut Map<String, Value>) -> Result<bool, CommandError> {
     let wait = take_optional(keys, "wait", "true or false", Value::as_bool)?;
     Ok(wait.unwrap_or(false))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn read(text: &str) -> Result<Wish, CommandError> {
-        Wish::from_json(text.as_bytes())
-    }
-
-    #[test]
-    fn commands_are_read_from_json() {
-        use Command as C;
-        type Is = fn(&Wish) -> bool;
-        use Wish as W;
-        let cases: [(&str, Is); 17] = [
-            (r#"{"action":"pause_at","time_s":4}"#, |c| matches!(c, W::Command(C::PauseAt(4.0)))),
-            (
-                r#"{"action":"snapshot","name":"a-1"}"#,
-                |c| matches!(c, W::Command(C::Snapshot(name)) if name == "a-1"),
-            ),
-            (
-                r#"{"action":"restore","name":"a-1"}"#,
-                |c| matches!(c, W::Restore(name) if name == "a-1"),
-            ),
-            (r#"{"action":"play"}"#, |c| matches!(c, W::Command(C::Play))),
-            (r#"{"action":"pause"}"#, |c| matches!(c, W::Command(C::Pause))),
-            (r#"{"action":"stop"}"#, |c| matches!(c, W::Stop)),
-            (r#"{"action":"quit"}"#, |c| matches!(c, W::Command(C::Quit))),
-            (r#"{"action":"step","ticks":3}"#, |c| {
-                matches!(c, W::Command(C::Step { ticks: 3, wait: false }))
-            }),
-            (r#"{"action":"step","ticks":3,"wait":true}"#, |c| {
-                matches!(c, W::Command(C::Step { ticks: 3, wait: true }))
-            }),
-            (r#"{"action":"step_until","time_s":2.5}"#, |c| {
-                matches!(c, W::Command(C::StepUntil { time_s: 2.5, wait: false }))
-            }),
-            (r#"{"action":"reset"}"#, |c| matches!(c, W::Reset { seed: None })),
-            (r#"{"action":"reset","seed":18446744073709551615}"#, |c| {
-                matches!(c, W::Reset { seed: Some(u64::MAX) })
-            }),
-            (r#"{"action":"set_speed","speed_m_s":20}"#, |c| {
-                matches!(c, W::Command(C::SetSpeed(20.0)))
-            }),
-            (r#"{"action":"pace","pace":"max"}"#, |c| matches!(c, W::Command(C::Pace(Pace::Max)))),
-            (r#"{"action":"pace","pace":0.5}"#, |c| {
-                matches!(c, W::Command(C::Pace(Pace::Factor(0.5))))
-            }),
-            (r#"{"pace":"2","action":"pace"}"#, |c| {
-                matches!(c, W::Command(C::Pace(Pace::Factor(2.0))))
-            }),
-            (r#"{"action":"lane_change","to":"left"}"#, |c| {
-                matches!(c, W::Command(C::LaneChange { to: LaneChoice::Left }))
-            }),
-        ];
-        for (text, is) in cases {
-            assert!(read(text).is_ok_and(|command| is(&command)), "{text}");
-        }
-    }
-
-    #[test]
-    fn what_is_no_command_is_refused_with_a_code_and_in_our_own_words() {
-        for (text, code, words) in [
-            ("", "not_an_object", "JSON object"),
-            ("[1]", "not_an_object", "JSON object"),
-            ("{}", "not_an_object", "action"),
-            (r#"{"action":"fly"}"#, "unknown_action", "\"fly\"; there are play"),
-            (r#"{"action":7}"#, "unknown_action", "7"),
-            (r#"{"action":"step"}"#, "missing_key", "step needs ticks"),
-            (r#"{"action":"step","ticks":-1}"#, "wrong_value", "ticks = -1"),
-            (r#"{"action":"step","ticks":0}"#, "wrong_value", "ticks = 0"),
-            (r#"{"action":"step","ticks":1000001}"#, "wrong_value", "1 to 1000000"),
-            (r#"{"action":"step","ticks":1,"wait":1}"#, "wrong_value", "wait = 1"),
-            (r#"{"action":"step_until","time_s":-1}"#, "wrong_value", "time_s = -1"),
-            (r#"{"action":"reset","seed":18446744073709551616}"#, "wrong_value", "seed = "),
-            (r#"{"action":"snapshot","name":"../a"}"#, "wrong_value", "lower-case letters"),
-            (r#"{"action":"restore"}"#, "missing_key", "restore needs name"),
-            (r#"{"action":"set_speed","speed_m_s":41}"#, "wrong_value", "0 to 40"),
-            (r#"{"action":"pace","pace":"NaN"}"#, "wrong_value", "realtime, max or a factor"),
-            (r#"{"action":"pace","pace":0}"#, "wrong_value", "pace = 0"),
-            (r#"{"action":"pace","pace":true}"#, "wrong_value", "pace = true"),
-            (r#"{"action":"lane_change","to":"up"}"#, "wrong_value", "left, right or keep"),
-            (r#"{"action":"play","extra":1}"#, "unknown_key", "extra"),
-        ] {
-            let error = read(text).err().unwrap();
-            assert_eq!(error.code(), code, "{text}");
-            assert!(error.to_string().contains(words), "{text}: {error}");
-        }
-    }
 }

@@ -5,9 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
+use planner::OutsideDemand;
 use planner::decider::DeciderKind;
 use recording::Recording;
-use sim::{EndReason, Status, TickTime, TickTimes, World};
+use sim::{EndReason, StackChange, Status, TickTime, TickTimes, World};
 use tokio::sync::oneshot;
 use tractrix_core::{Recorder, Step, Tick, Time};
 
@@ -323,6 +324,17 @@ impl Drive {
                 self.job.world.stack_mut().set_speed(speed_m_s);
                 Ok(())
             }
+            Command::Change(change) => self.change(&change),
+            Command::External { accel_m_s2, road_wheel_rad } => {
+                let time = self.job.world.now();
+                let demand = OutsideDemand { time, accel_m_s2, road_wheel_rad };
+                self.change(&StackChange::Outside { demand: Some(demand) })
+            }
+            Command::Release => self.change(&StackChange::Outside { demand: None }),
+            Command::Fault(fault, is_on) => {
+                let set = self.job.world.set_fault(fault, is_on);
+                set.map_err(|e| Refused::NoBus(e.to_string()))
+            }
             Command::Quit => {
                 self.quits = true;
                 self.enter(State::Quitting);
@@ -353,6 +365,15 @@ impl Drive {
         } else {
             let _ = reply.send(Ok(self.acted()));
         }
+    }
+
+    /// Changes the stack, and notes it in the recording.
+    fn change(&mut self, change: &StackChange) -> Result<(), Refused> {
+        let unusable = |e: sim::SimError| Refused::Unusable(e.to_string());
+        let words = change.to_toml().map_err(unusable)?;
+        self.job.world.change(change).map_err(unusable)?;
+        self.job.recording.change(self.job.world.now(), words);
+        Ok(())
     }
 
     fn wish(&mut self, to: planner::decider::LaneChoice) -> Result<(), Refused> {

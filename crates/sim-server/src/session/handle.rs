@@ -58,8 +58,10 @@ pub(crate) enum Refused {
     Ended,
     #[error("{action} is not possible while the session is {state:?}: {needs}")]
     WrongState { action: &'static str, state: State, needs: &'static str },
-    #[error("the run decides on lane changes itself; start it with --decider external")]
+    #[error("the run decides on lane changes itself; set_decider can make it external")]
     NoExternalDecider,
+    #[error("{0}")]
+    NoBus(String),
     #[error("the truck behind {0} cannot be put back to where it was")]
     OutsideBus(String),
     #[error("SUMO drives the traffic: its run cannot be reset or kept, nor another one begun")]

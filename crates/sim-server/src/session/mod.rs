@@ -7,6 +7,8 @@
 //! a recording of its own; nothing is rewound.
 
 mod command;
+#[cfg(test)]
+mod command_tests;
 mod drive;
 mod handle;
 mod pace;

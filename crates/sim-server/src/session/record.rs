@@ -55,7 +55,7 @@ pub(super) fn start_recording(
         metadata.insert("continues_at_s".to_owned(), begins_s.to_string());
     }
     let files = BTreeMap::from([
-        ("scenario.toml", toml::to_string(scenario).map_err(Failure::work)?),
+        ("scenario.toml", toml::to_string(&world.scenario_now()).map_err(Failure::work)?),
         ("stack.toml", toml::to_string(world.stack().config()).map_err(Failure::work)?),
     ]);
     let road = Arc::clone(world.road());

@@ -9,6 +9,8 @@
 )]
 
 pub mod client;
+pub mod run;
+pub mod serving;
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -163,11 +163,13 @@ impl<B: Bus> EcuSim<B> {
         self.let_go
     }
 
-    /// Breaks something.
-    pub fn break_down(&mut self, fault: EcuFault) {
+    /// Breaks something, or mends it.
+    pub fn set_fault(&mut self, fault: EcuFault, is_on: bool) {
         match fault {
-            EcuFault::Silent(unit) => self.unit(unit).is_silent = true,
-            EcuFault::FrozenWheels => self.frozen_m_s = Some(self.ego.value.speed_m_s),
+            EcuFault::Silent(unit) => self.unit(unit).is_silent = is_on,
+            EcuFault::FrozenWheels => {
+                self.frozen_m_s = is_on.then_some(self.ego.value.speed_m_s);
+            }
         }
     }
 
