@@ -358,6 +358,32 @@ class Session:
         """Wishes a lane change (`--decider external`); the safety gate decides."""
         return self._control(action="lane_change", to=to)
 
+    def set_decider(self, decider: str) -> Acted:
+        """Another decider: `keep`, `rules:METRES`, `mobil`, `rollout`, `dqn`, `external`."""
+        return self._control(action="set_decider", decider=decider)
+
+    def set_speed_planner(
+        self, speed_planner: Literal["cruise", "predictive"]
+    ) -> Acted:
+        """Another source of the reference speed."""
+        return self._control(action="set_speed_planner", speed_planner=speed_planner)
+
+    def external(self, accel_m_s2: float, road_wheel_rad: float) -> Acted:
+        """Drives the truck: acceleration along the road, angle of the front wheels (positive:
+        left). Without another call within 0.2 s of simulation time the truck stops in its lane."""
+        return self._control(
+            action="external", accel_m_s2=accel_m_s2, road_wheel_rad=road_wheel_rad
+        )
+
+    def release(self) -> Acted:
+        """Gives the truck back to its stack."""
+        return self._control(action="release")
+
+    def fault(self, fault: str, on: bool = True) -> Acted:
+        """Breaks something, or mends it: `localisation`, `perception`; over a bus `wheel_speeds`
+        and the control units (`engine`, `brakes`, `steering`, ...)."""
+        return self._control(action="fault", fault=fault, on=on)
+
     def quit(self) -> Acted:
         """Ends the run and the session; with `run` the program too."""
         return self._control(action="quit")

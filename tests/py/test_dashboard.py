@@ -490,6 +490,40 @@ def test_a_run_is_driven_to_a_time_and_begun_again_from_the_page(
         assert run.get("/api/v1/state")["time_s"] == pytest.approx(12.49)
 
 
+def test_decider_planner_and_faults_are_set_on_the_page(
+    server: Path, page: Page, tmp_path: Path
+) -> None:
+    with running(server, tmp_path / "out", "flat", "--pace", "5") as run:
+        page.goto(run.url)
+        page.wait_for_selector("#strips .trace", state="attached")
+        page.click(".more summary")
+        page.wait_for_function("document.getElementById('decider').value === 'keep'")
+        page.select_option("#decider", "mobil")
+        page.select_option("#speed-planner", "predictive")
+        page.select_option("#fault", "perception")
+        page.click("#break")
+        page.wait_for_selector("#banner:has-text('Broken: perception')")
+        page.wait_for_selector("#maneuver:has-text('minimal risk')")
+        page.wait_for_selector("#break:has-text('Mend')")
+        picture = Path(os.environ.get("SETTINGS_PICTURE", tmp_path / "settings.png"))
+        page.screenshot(path=picture)
+        page.click("#break")
+        page.wait_for_selector("#banner", state="hidden")
+        now = run.get("/api/v1/state")["run"]
+        assert now["decider"] == "mobil" and now["speed_planner"] == "predictive"
+        # Somebody drives, and says no more
+        body = {"action": "external", "accel_m_s2": 0.0, "road_wheel_rad": 0.0}
+        post = urllib.request.Request(
+            run.url + "/api/v1/control",
+            json.dumps(body).encode(),
+            headers={"Content-Type": "application/json"},
+        )
+        urllib.request.urlopen(post, timeout=10)
+        page.wait_for_selector("#banner:has-text('Driven from outside')")
+        page.click("#release")
+        page.wait_for_selector("#banner", state="hidden")
+
+
 def test_a_refusal_is_shown_in_the_servers_words(
     server: Path, browser: Browser, tmp_path: Path
 ) -> None:

@@ -3,7 +3,9 @@
 
 use std::path::Path;
 
-use ros2::definitions::{AUTOWARE_VEHICLE_MSGS, Definition, SIMULATION_INTERFACES, TF2_MSGS};
+use ros2::definitions::{
+    AUTOWARE_CONTROL_MSGS, AUTOWARE_VEHICLE_MSGS, Definition, SIMULATION_INTERFACES, TF2_MSGS,
+};
 
 fn main() -> std::io::Result<()> {
     let Some(folder) = std::env::args_os().nth(1) else {
@@ -14,6 +16,7 @@ fn main() -> std::io::Result<()> {
     write(folder, "tf2_msgs", &["geometry_msgs"], TF2_MSGS)?;
     let needs = ["builtin_interfaces", "std_msgs"];
     write(folder, "autoware_vehicle_msgs", &needs, AUTOWARE_VEHICLE_MSGS)?;
+    write(folder, "autoware_control_msgs", &["builtin_interfaces"], AUTOWARE_CONTROL_MSGS)?;
     let needs = ["std_msgs", "geometry_msgs", "action_msgs"];
     write(folder, "simulation_interfaces", &needs, SIMULATION_INTERFACES)
 }

@@ -28,7 +28,7 @@ use crate::autoware::{Autoware, Names};
 use crate::bytes::Encoded;
 use crate::error::Ros2Error;
 use crate::feed::{Feed, Outlet, clock_ns, feed};
-use crate::interfaces::command::{Asks, Float64, Text};
+use crate::interfaces::command::{Asks, Bool, Control, Float64, Text};
 use crate::network::Network;
 use crate::services;
 use crate::simulator::{Refused, Simulator};
@@ -226,6 +226,13 @@ impl Setup {
         Ok(vec![
             self.command::<Float64>("/command/set_speed", ("std_msgs", "Float64"), s, log)?,
             self.command::<Text>("/command/lane_change", ("std_msgs", "String"), s, log)?,
+            self.command::<Bool>("/command/external_control", ("std_msgs", "Bool"), s, log)?,
+            self.command::<Control>(
+                "/control/command/control_cmd",
+                ("autoware_control_msgs", "Control"),
+                s,
+                log,
+            )?,
             self.service("get_simulator_features", "GetSimulatorFeatures", s, services::features)?,
             self.service("get_simulation_state", "GetSimulationState", s, services::state)?,
             self.service("set_simulation_state", "SetSimulationState", s, services::set_state)?,

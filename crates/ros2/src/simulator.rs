@@ -47,6 +47,15 @@ pub enum Request {
     },
     /// Wishes a lane change.
     LaneChange(Direction),
+    /// Somebody else drives from here on.
+    Control {
+        /// m/s², -10 to 5.
+        accel_m_s2: f64,
+        /// Angle of the front wheels, rad, -1 to 1; positive: to the left.
+        road_wheel_rad: f64,
+    },
+    /// Nobody else drives any more.
+    Release,
 }
 
 /// Where to.

@@ -88,6 +88,10 @@ fn command(handle: &Handle, request: Request) -> Result<Command, Refused> {
             let seed = scenario.seed(None).map_err(|e| Refused::Unusable(e.to_string()))?;
             handle.begin(&scenario, seed, State::Stopped)?
         }
+        Request::Control { accel_m_s2, road_wheel_rad } => {
+            Command::External { accel_m_s2, road_wheel_rad }
+        }
+        Request::Release => Command::Release,
         Request::SetSpeed { speed_m_s } => Command::SetSpeed(speed_m_s),
         Request::LaneChange(to) => Command::LaneChange {
             to: match to {

@@ -100,6 +100,26 @@ pub const SIMULATION_INTERFACES: &[Definition] = &[
     ),
 ];
 
+/// Package `autoware_control_msgs`: how another controller drives the truck.
+pub const AUTOWARE_CONTROL_MSGS: &[Definition] = &[
+    (
+        "msg/Lateral.msg",
+        "builtin_interfaces/Time stamp\nbuiltin_interfaces/Time control_time\n\
+         float32 steering_tire_angle\nfloat32 steering_tire_rotation_rate\n\
+         bool is_defined_steering_tire_rotation_rate\n",
+    ),
+    (
+        "msg/Longitudinal.msg",
+        "builtin_interfaces/Time stamp\nbuiltin_interfaces/Time control_time\nfloat32 velocity\n\
+         float32 acceleration\nfloat32 jerk\nbool is_defined_acceleration\nbool is_defined_jerk\n",
+    ),
+    (
+        "msg/Control.msg",
+        "builtin_interfaces/Time stamp\nbuiltin_interfaces/Time control_time\nLateral lateral\n\
+         Longitudinal longitudinal\n",
+    ),
+];
+
 /// Package `autoware_vehicle_msgs`: what this node says under Autoware's names.
 pub const AUTOWARE_VEHICLE_MSGS: &[Definition] = &[
     (

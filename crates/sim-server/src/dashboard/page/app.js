@@ -1,7 +1,7 @@
 // The dashboard: takes frames from /ws, fills the header and tiles, feeds views and strip plots.
 import { Ahead } from "/assets/ahead.js";
 import { ask, base, run as playedRun, session } from "/assets/common.js";
-import { enable, selectPace, startControls } from "/assets/controls.js";
+import { enable, showSettings, startControls } from "/assets/controls.js";
 import { MiniMap } from "/assets/minimap.js";
 import { live, Recorded } from "/assets/source.js";
 import { Strips } from "/assets/strips.js";
@@ -76,7 +76,7 @@ function show(f) {
   if (playedRun === null) enable(run.state);
   for (const id of ["left", "right"]) $(id).hidden = !run.external_decider;
   text("play", run.state === "paused" ? "Play" : "Pause");
-  if (document.activeElement !== $("pace")) selectPace(run.pace);
+  if (playedRun === null) showSettings(run);
   text("time", clock(f.time_s));
   text("factor", run.state === "running" ? `${run.realtime_factor.toFixed(run.realtime_factor < 20 ? 1 : 0)}×` : "");
 
@@ -142,6 +142,8 @@ function banner(run) {
   if (run.off_road) said.push("A wheel is off the road.");
   else if (run.off_road_events > 0) said.push(`Off the road ${times(run.off_road_events)}, ${run.off_road_time_s.toFixed(1)} s.`);
   if (run.collisions > 0) said.push(`Collided ${times(run.collisions)}.`);
+  if (run.driven_from_outside) said.push("Driven from outside.");
+  if (run.faults?.length > 0) said.push(`Broken: ${run.faults.map((fault) => fault.replaceAll("_", " ")).join(", ")}.`);
   $("banner").hidden = said.length === 0;
   text("banner", said.join(" "));
 }

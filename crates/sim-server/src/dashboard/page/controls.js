@@ -12,14 +12,26 @@ const send = (command) => ask(JSON.stringify(command));
 // What can be asked of a run in this state; null: there is none.
 export function enable(state) {
   const drives = state === "running" || state === "paused";
-  for (const id of ["play", "step", "pace", "left", "right", "set-speed", "until"]) $(id).disabled = !drives;
+  for (const id of ["play", "step", "pace", "left", "right", "set-speed", "until", "decider", "speed-planner", "break", "release"]) $(id).disabled = !drives;
   $("again").disabled = state === null;
 }
 
-export function selectPace(pace) {
-  const select = $("pace");
-  if (![...select.options].some((o) => o.value === pace)) select.add(new Option(`${pace}×`, pace));
-  select.value = pace;
+function select(id, value, name) {
+  const list = $(id);
+  if (document.activeElement === list) return;
+  if (![...list.options].some((o) => o.value === value)) list.add(new Option(name, value));
+  list.value = value;
+}
+
+// How the run is set; a list that is open is left alone.
+export function showSettings(run) {
+  select("pace", run.pace, `${run.pace}×`);
+  select("decider", run.decider, run.decider);
+  select("speed-planner", run.speed_planner, run.speed_planner);
+  const isOn = run.faults.includes($("fault").value);
+  $("break").textContent = isOn ? "Mend" : "Break";
+  $("break").setAttribute("aria-pressed", isOn);
+  $("release").hidden = !run.driven_from_outside;
 }
 
 export function startControls(view, frame) {
@@ -32,6 +44,10 @@ export function startControls(view, frame) {
   $("right").onclick = () => change("right");
   $("step").onclick = step;
   $("pace").onchange = (e) => { send({ action: "pace", pace: e.target.value }); e.target.blur(); };
+  const chosen = (id, command) => { $(id).onchange = (e) => { send(command(e.target.value)); e.target.blur(); }; };
+  chosen("decider", (decider) => ({ action: "set_decider", decider }));
+  chosen("speed-planner", (speed_planner) => ({ action: "set_speed_planner", speed_planner }));
+  $("release").onclick = () => send({ action: "release" });
   $("theme").onclick = nextTheme;
   onTheme(() => { $("theme").textContent = `Theme: ${theme()}`; });
   $("in").onclick = () => view.zoomBy(1.35);
@@ -42,6 +58,10 @@ export function startControls(view, frame) {
 
   const onSubmit = (form, act) => { $(form).onsubmit = (e) => { e.preventDefault(); act(); }; };
   onSubmit("set-speed-form", () => send({ action: "set_speed", speed_m_s: $("set-speed-kmh").valueAsNumber / KMH }));
+  onSubmit("fault-form", () => {
+    const fault = $("fault").value;
+    return send({ action: "fault", fault, on: !frame()?.run.faults.includes(fault) });
+  });
   onSubmit("until-form", async () => {
     const time_s = $("until-s").valueAsNumber;
     return await paused() && send({ action: "step_until", time_s });
