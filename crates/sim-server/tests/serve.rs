@@ -9,6 +9,7 @@
 
 mod support;
 
+use std::process::Stdio;
 use std::time::Duration;
 
 use serde_json::{Value, json};
