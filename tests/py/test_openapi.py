@@ -16,7 +16,7 @@ from schemathesis.core.result import Ok
 from schemathesis.generation import GenerationMode
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 
-OPERATIONS = 32
+OPERATIONS = 33
 """Paths and methods."""
 
 

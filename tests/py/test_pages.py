@@ -236,7 +236,46 @@ def test_a_run_is_deleted_only_after_a_question(site: Run, page: Page) -> None:
     assert "flat-77" not in names
 
 
-@pytest.mark.parametrize("path", ["/runs", "/compare", "/scenario"])
+def test_the_bus_of_a_session_is_seen_message_by_message(
+    site: Run, strict_page: Page, tmp_path: Path
+) -> None:
+    session = begin(site, scenario="flat", vehicle="bus", pace="realtime")["id"]
+    page = strict_page
+    page.goto(f"{site.url}/bus?session={session}")
+    engine = page.locator("#messages tr", has=page.locator("th", has_text="EEC1"))
+    expect(engine).to_have_count(1)
+    page.wait_for_timeout(1500)
+    rate = float(engine.locator("td").nth(3).inner_text())
+    assert 40.0 < rate < 110.0, rate
+    engine.locator("summary").click()
+    expect(engine.locator("dl.signals")).to_contain_text("engine_speed")
+    # An open list of signals stays open while its values go on
+    page.wait_for_timeout(1200)
+    expect(engine.locator("dl.signals")).to_be_visible()
+    expect(page.locator("#faults")).to_have_text("All in order.")
+    assert page.locator("#claims tr").count() >= 8
+    page.fill("#find", "eec2")
+    expect(page.locator("#messages tr")).to_have_count(1)
+    page.fill("#find", "")
+    control = f"/api/v1/sessions/{session}/control"
+    body = {"action": "fault", "fault": "engine", "on": True}
+    asked = urllib.request.Request(
+        site.url + control,
+        json.dumps(body).encode(),
+        {"Content-Type": "application/json"},
+    )
+    urllib.request.urlopen(asked, timeout=30).close()
+    expect(page.locator("#faults")).to_contain_text("signal lost since")
+    expect(engine.locator("td.late")).to_have_count(1)
+    picture(page, "bus", tmp_path)
+    page.goto(site.url + "/runs")
+    end = urllib.request.Request(
+        f"{site.url}/api/v1/sessions/{session}", method="DELETE"
+    )
+    urllib.request.urlopen(end, timeout=60).close()
+
+
+@pytest.mark.parametrize("path", ["/runs", "/compare", "/scenario", "/bus"])
 @pytest.mark.parametrize("width", [390, 1280])
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_pages_fit_and_can_be_used_by_keyboard(
@@ -259,4 +298,4 @@ def test_pages_fit_and_can_be_used_by_keyboard(
                 "document.activeElement?.id || document.activeElement?.textContent"
             )
         )
-    assert {"Live", "Runs", "Compare", "Scenario", "theme"} <= reached
+    assert {"Live", "Runs", "Compare", "Scenario", "Bus", "theme"} <= reached

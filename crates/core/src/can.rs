@@ -31,3 +31,15 @@ pub trait BusRecorder {
     /// The bus was given a frame at `now`, and why it did not take it, if so.
     fn sent(&mut self, now: Time, frame: RawFrame, trouble: Option<BusTrouble>);
 }
+
+impl<A: BusRecorder, B: BusRecorder> BusRecorder for (A, B) {
+    fn received(&mut self, now: Time, what: Result<Option<Stamped<RawFrame>>, BusTrouble>) {
+        self.0.received(now, what);
+        self.1.received(now, what);
+    }
+
+    fn sent(&mut self, now: Time, frame: RawFrame, trouble: Option<BusTrouble>) {
+        self.0.sent(now, frame, trouble);
+        self.1.sent(now, frame, trouble);
+    }
+}

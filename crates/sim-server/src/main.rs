@@ -4,6 +4,8 @@
 //! commanded through one door; the recording and the viewers get its ticks over bounded channels,
 //! lossless to the recording, lossy to viewers. Only this crate knows an async runtime.
 
+mod bus_board;
+mod bus_content;
 mod cli;
 mod cmd;
 mod dashboard;

@@ -8,9 +8,9 @@ mod support;
 use std::time::Duration;
 
 use serde_json::{Value, json};
-use support::program;
 use support::run::Run;
 use support::serving::refusal;
+use support::{client, program};
 
 fn step(run: &Run, ticks: u32) -> Value {
     let acted = run.act(&json!({"action": "step", "ticks": ticks, "wait": true}).to_string());
@@ -90,10 +90,31 @@ fn a_control_unit_of_a_truck_on_a_bus_falls_silent_and_speaks_again() {
     let run = Run::start(&["--pace", "max", "--vehicle", "bus"]);
     run.act(r#"{"action": "pause"}"#);
     run.act(r#"{"action": "step", "ticks": 300, "wait": true}"#);
+    step(&run, 1);
+    let bus = || run.ask("GET", "/api/v1/sessions/default/bus", "", b"").1;
+    let message = |bus: &Value, name: &str| {
+        let messages = bus["messages"].as_array().unwrap();
+        messages.iter().find(|m| m["name"] == name).unwrap_or_else(|| panic!("{bus}")).clone()
+    };
+    let seen = bus();
+    assert_eq!((&seen["vehicle"], &seen["faults"]), (&"bus".into(), &json!([])), "{seen}");
+    let engine = message(&seen, "EEC1");
+    let rate_hz = engine["rate_hz"].as_f64().unwrap();
+    assert!((45.0..110.0).contains(&rate_hz), "{engine}");
+    let speed = engine["signals"].as_array().unwrap().iter();
+    let speed = speed.filter(|s| s["name"].as_str().unwrap().contains("speed")).count();
+    assert!(speed > 0 && engine["sent_by_the_stack"] == false, "{engine}");
+    assert_eq!(message(&seen, "XBR")["sent_by_the_stack"], true);
+    assert!(seen["claims"].as_array().unwrap().len() >= 8, "seven units and the stack: {seen}");
     run.act(r#"{"action": "fault", "fault": "engine", "on": true}"#);
     let silent = step(&run, 100);
     assert_eq!(silent["plan"]["maneuver"], "minimal_risk", "{silent}");
     assert_eq!(silent["plan"]["guard"], json!(["bus"]), "{silent}");
+    let seen = bus();
+    assert_eq!(seen["faults"][0]["fault"], "signal_lost", "{seen}");
+    assert!(message(&seen, "EEC1")["age_s"].as_f64().unwrap() > 0.5);
+    let metrics = client::text(&run.serving.address, "/api/v1/metrics");
+    assert!(metrics.contains("tractrix_truck_faults{session=\"default\"} 1"), "{metrics}");
     run.act(r#"{"action": "fault", "fault": "engine", "on": false}"#);
     let speaks = step(&run, 300);
     assert_eq!(speaks["run"]["faults"], json!([]), "{speaks}");

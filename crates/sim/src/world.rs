@@ -10,7 +10,9 @@ use j1939::bus::Bus;
 use planner::decider::DeciderKind;
 use planner::{RatesConfig, Situation, Stack, StackConfig, Tactics};
 use road::Road;
-use tractrix_core::{Geometry, Recorder, Scene, Tick, Time, TrafficSource, Vehicle, VehicleLimits};
+use tractrix_core::{
+    Geometry, Recorder, Scene, Tick, Time, TrafficSource, Vehicle, VehicleLimits, VehicleStatus,
+};
 
 use crate::ecu::Ahead;
 use crate::fault::Faults;
@@ -268,6 +270,12 @@ impl World {
             Truck::Bus(looped) => Some(looped.figures()),
             Truck::Direct(_) | Truck::Detached(_) => None,
         }
+    }
+
+    /// What is wrong with the truck, as the stack sees it.
+    #[must_use]
+    pub fn vehicle_status(&self) -> VehicleStatus {
+        self.plant.truck.status()
     }
 
     /// The ghost and how the truck compares with it, if one drives along.

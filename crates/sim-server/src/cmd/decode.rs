@@ -1,6 +1,5 @@
 //! `decode LOG`: what a log of a J1939 bus says, signal by signal.
 
-mod content;
 mod print;
 mod wanted;
 
@@ -11,9 +10,9 @@ use clap::{Parser, ValueEnum};
 use j1939::bus::BusError;
 use j1939::bus::candump::{Heard, Told, messages};
 
+use crate::bus_content::{self, Content};
 use crate::failure::Failure;
 use crate::output;
-use content::Content;
 use print::Printer;
 use wanted::Wanted;
 
@@ -97,7 +96,7 @@ struct Decoder {
 
 impl Decoder {
     fn message(&mut self, heard: &Heard<'_>) -> Result<(), Failure> {
-        let Some((message, content)) = content::read(heard.id, heard.bytes) else {
+        let Some((message, content)) = bus_content::read(heard.id, heard.bytes) else {
             self.counts.not_in_table += 1;
             return Ok(());
         };

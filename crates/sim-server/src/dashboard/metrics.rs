@@ -35,6 +35,9 @@ struct Figures {
     realtime_factor: Family<Of, Gauge<f64, AtomicU64>>,
     viewers: Family<Of, Gauge>,
     lost_frames: Family<Of, Counter>,
+    waiting_commands: Family<Of, Gauge>,
+    truck_faults: Family<Of, Gauge>,
+    bus_errors: Family<Of, Gauge>,
 }
 
 /// The figures of one session. They go with it.
@@ -48,6 +51,9 @@ pub(crate) struct SessionMetrics {
     pub(super) realtime_factor: Gauge<f64, AtomicU64>,
     pub(super) viewers: Gauge,
     pub(super) lost_frames: Counter,
+    pub(super) waiting_commands: Gauge,
+    pub(super) truck_faults: Gauge,
+    pub(super) bus_errors: Gauge,
 }
 
 impl Metrics {
@@ -63,6 +69,9 @@ impl Metrics {
             realtime_factor: Family::default(),
             viewers: Family::default(),
             lost_frames: Family::default(),
+            waiting_commands: Family::default(),
+            truck_faults: Family::default(),
+            bus_errors: Family::default(),
         };
         let f = figures.clone();
         registry.register("ticks", "Ticks driven", f.ticks);
@@ -76,6 +85,12 @@ impl Metrics {
         registry.register("viewers", "Viewers of /ws", f.viewers);
         let help = "Frames that viewers were too slow for";
         registry.register("lost_frames", help, f.lost_frames);
+        let help = "Commands that wait for the end of a tick";
+        registry.register("waiting_commands", help, f.waiting_commands);
+        let help = "What the stack finds wrong with the truck or its bus now";
+        registry.register("truck_faults", help, f.truck_faults);
+        let help = "Readings and sendings of the bus that failed in this run";
+        registry.register("bus_errors", help, f.bus_errors);
         let sessions = Gauge::default();
         registry.register("sessions", "Sessions", sessions.clone());
         Arc::new(Self { registry, figures, sessions })
@@ -93,6 +108,9 @@ impl Metrics {
             realtime_factor: f.realtime_factor.get_or_create_owned(&of),
             viewers: f.viewers.get_or_create_owned(&of),
             lost_frames: f.lost_frames.get_or_create_owned(&of),
+            waiting_commands: f.waiting_commands.get_or_create_owned(&of),
+            truck_faults: f.truck_faults.get_or_create_owned(&of),
+            bus_errors: f.bus_errors.get_or_create_owned(&of),
             all: Arc::clone(self),
             of,
         }
@@ -126,5 +144,8 @@ impl Drop for SessionMetrics {
         f.realtime_factor.remove(&self.of);
         f.viewers.remove(&self.of);
         f.lost_frames.remove(&self.of);
+        f.waiting_commands.remove(&self.of);
+        f.truck_faults.remove(&self.of);
+        f.bus_errors.remove(&self.of);
     }
 }

@@ -8,6 +8,7 @@ mod access;
 mod ahead;
 mod api;
 mod assets;
+mod bus;
 mod connections;
 mod events;
 mod frame;

@@ -52,6 +52,18 @@ pub(super) struct NewSession {
     /// `cruise` or `predictive`.
     #[schema(nullable = false)]
     speed_planner: Option<String>,
+    /// How the stack reaches the truck: `direct`, or over a `bus` in memory.
+    #[schema(value_type = Option<VehicleWord>, nullable = false)]
+    vehicle: Option<String>,
+}
+
+/// The ways to a truck that are not outside of the program.
+#[derive(ToSchema)]
+#[schema(rename_all = "snake_case")]
+#[expect(dead_code, reason = "a schema")]
+enum VehicleWord {
+    Direct,
+    Bus,
 }
 
 /// Reads the body.
@@ -116,7 +128,12 @@ impl NewSession {
         };
         changes.apply(&mut scenario).map_err(|e| e.to_string())?;
         let seed = scenario.seed(self.seed).map_err(|e| e.to_string())?;
-        Ok(Wanted { scenario, seed, state: self.state()?, pace: self.pace()? })
+        let vehicle = match self.vehicle.as_deref() {
+            None | Some("direct") => "direct".to_owned(),
+            Some("bus") => "bus".to_owned(),
+            Some(other) => return Err(format!("vehicle = {other:?}: expected direct or bus")),
+        };
+        Ok(Wanted { scenario, seed, state: self.state()?, pace: self.pace()?, vehicle })
     }
 }
 

@@ -78,6 +78,7 @@ impl Publisher {
             self.realtime_factor = (time_s - self.mark.1) / (wall_s - self.mark.0);
             self.mark = (wall_s, time_s);
         }
+        self.note_health(world);
         let (summary, ghost, settings) = (world.summary(), world.ghost(), Settings::of(world));
         let frame = Frame {
             provenance: self.provenance,
@@ -128,6 +129,17 @@ impl Publisher {
             self.watcher.settings(time_s, settings, events);
             self.shared.publish(frame.into(), state == RunState::Finished);
         }
+    }
+
+    /// What is not in order about truck, bus and commands.
+    fn note_health(&self, world: &World) {
+        let (handle, metrics) = (&self.shared.handle, &self.shared.metrics);
+        let status = world.vehicle_status();
+        let faults = i64::try_from(status.faults().count()).unwrap_or(i64::MAX);
+        metrics.truck_faults.set(faults);
+        metrics.waiting_commands.set(handle.waiting().into());
+        let errors = handle.bus().note(world.bus(), status);
+        metrics.bus_errors.set(i64::try_from(errors).unwrap_or(i64::MAX));
     }
 
     /// Notes how long a tick's work took.

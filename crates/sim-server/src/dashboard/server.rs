@@ -15,7 +15,8 @@ use utoipa_axum::routes;
 use super::access::Access;
 use super::hub::{Hub, Of};
 use super::{
-    Shared, api, assets, connections, gate, jobs, library, openapi, problem, runs, sessions, socket,
+    Shared, api, assets, bus, connections, gate, jobs, library, openapi, problem, runs, sessions,
+    socket,
 };
 use crate::failure::Failure;
 use crate::session::DEFAULT;
@@ -69,6 +70,7 @@ fn session() -> OpenApiRouter<Arc<Hub>> {
         .routes(routes!(api::frames))
         .routes(routes!(api::events))
         .routes(routes!(api::entities))
+        .routes(routes!(bus::bus))
         .routes(routes!(api::control))
 }
 

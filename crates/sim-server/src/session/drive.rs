@@ -286,7 +286,8 @@ impl Drive {
         self.show_start();
     }
 
-    fn act(&mut self, Asked { command, reply }: Asked) {
+    fn act(&mut self, Asked { command, reply, place }: Asked) {
+        drop(place);
         if self.is_over() {
             let _ = reply.send(Err(Refused::Ended));
             return;

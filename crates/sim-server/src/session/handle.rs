@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -11,6 +12,7 @@ use tokio::sync::oneshot;
 use tractrix_core::{EgoState, Neighbour, Time};
 
 use super::Command;
+use crate::bus_board::BusBoard;
 
 /// Commands under way, at most.
 const QUEUE: usize = 64;
@@ -94,6 +96,24 @@ pub(crate) struct Next {
 pub(crate) struct Asked {
     pub(crate) command: Command,
     pub(crate) reply: oneshot::Sender<Result<Acted, Refused>>,
+    /// It is in the queue.
+    pub(super) place: InQueue,
+}
+
+/// A place in the queue of commands, until it is dropped.
+pub(super) struct InQueue(Arc<AtomicU32>);
+
+impl InQueue {
+    fn take(waiting: &Arc<AtomicU32>) -> Self {
+        waiting.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(waiting))
+    }
+}
+
+impl Drop for InQueue {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 /// What comes when a command has acted.
@@ -140,6 +160,9 @@ pub(crate) struct Handle {
     view: Arc<Mutex<View>>,
     /// The bus outside that the truck is reached over: it has no way back to a start.
     outside_bus: Option<Arc<str>>,
+    bus: BusBoard,
+    /// Commands that wait for the end of a tick.
+    waiting: Arc<AtomicU32>,
 }
 
 /// A session's door, and where its commands arrive.
@@ -161,7 +184,8 @@ pub(crate) fn channel(
         kept,
     };
     let outside_bus = outside_bus.map(Arc::from);
-    (Handle { queue, view: Arc::new(Mutex::new(view)), outside_bus }, asked)
+    let (view, bus, waiting) = (Arc::new(Mutex::new(view)), BusBoard::default(), Arc::default());
+    (Handle { queue, view, outside_bus, bus, waiting }, asked)
 }
 
 impl Handle {
@@ -179,7 +203,8 @@ impl Handle {
     /// [`Refused`]: it is not taken.
     pub(crate) fn send(&self, command: Command) -> Result<Answer, Refused> {
         let (reply, answer) = oneshot::channel();
-        self.queue.try_send(Asked { command, reply }).map_err(|e| match e {
+        let place = InQueue::take(&self.waiting);
+        self.queue.try_send(Asked { command, reply, place }).map_err(|e| match e {
             TrySendError::Full(_) => Refused::TooMany,
             TrySendError::Disconnected(_) => Refused::Ended,
         })?;
@@ -251,6 +276,16 @@ impl Handle {
         }
         let world = World::new(scenario, seed).map_err(|e| Refused::Unusable(e.to_string()))?;
         Ok(Command::Begin(Box::new(Next { world, seed, state })))
+    }
+
+    /// Commands that wait for the end of a tick.
+    pub(crate) fn waiting(&self) -> u32 {
+        self.waiting.load(Ordering::Relaxed)
+    }
+
+    /// What is on the bus.
+    pub(crate) const fn bus(&self) -> &BusBoard {
+        &self.bus
     }
 
     /// The state now.

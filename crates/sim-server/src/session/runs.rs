@@ -88,7 +88,7 @@ impl Runs {
         asked: Receiver<Asked>,
     ) -> Result<Prepared, Failure> {
         let Begin { mut world, seed, state, out, waiting } = begin;
-        let bus = super::vehicle::connect(&mut world, &self.vehicle)?;
+        let bus = super::vehicle::connect(&mut world, &self.vehicle, self.handle.bus())?;
         warn_of_road(world.road());
         let (provenance, started) = (Provenance::of_seed(seed), unix_time());
         let recording =
@@ -166,7 +166,7 @@ impl Runs {
     /// Behind the end of a run: waits for another one. Everything else is refused.
     fn next_one(&self, asked: Receiver<Asked>) -> (Option<(Box<Next>, Reply)>, Receiver<Asked>) {
         while !self.stop.load(Ordering::Relaxed) {
-            let Asked { command, reply } = match asked.recv_timeout(LOOK) {
+            let Asked { command, reply, .. } = match asked.recv_timeout(LOOK) {
                 Ok(asked) => asked,
                 Err(RecvTimeoutError::Timeout) => continue,
                 Err(RecvTimeoutError::Disconnected) => break,

@@ -18,6 +18,8 @@ pub(crate) struct Wanted {
     pub(crate) seed: u64,
     pub(crate) state: State,
     pub(crate) pace: Pace,
+    /// `direct` or `bus`.
+    pub(crate) vehicle: String,
 }
 
 /// Builds the world, and starts the session's thread. The session is there until somebody ends it.
@@ -30,7 +32,7 @@ pub(crate) fn start(
     claim: Claim,
     metrics: &Arc<Metrics>,
 ) -> Result<Arc<Shared>, Failure> {
-    let Wanted { scenario, seed, state, pace } = wanted;
+    let Wanted { scenario, seed, state, pace, vehicle } = wanted;
     let place = Place::In(runs.to_owned());
     let out = place.of_first(*seed, scenario, false)?;
     let world = first_world(scenario, *seed, &out)?;
@@ -40,7 +42,7 @@ pub(crate) fn start(
         Shared::new(claim.id(), setting(&world), handle.clone(), metrics, Arc::clone(&stop));
     let runs = Runs {
         place,
-        vehicle: "direct".to_owned(),
+        vehicle: vehicle.clone(),
         pace: *pace,
         stays: true,
         listeners: Listeners::default(),

@@ -9,7 +9,7 @@ use tractrix_core::Time;
 use j1939::bus::candump::Heard;
 
 use super::Format;
-use super::content::{Content, Item, Said};
+use crate::bus_content::{Content, Item, Said};
 use crate::failure::Failure;
 use crate::output::Lines;
 

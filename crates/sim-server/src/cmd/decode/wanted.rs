@@ -3,7 +3,7 @@
 use j1939::message::MESSAGES;
 use tractrix_core::words;
 
-use super::content::{Content, OTHER_SIGNALS, OTHERS};
+use crate::bus_content::{Content, OTHER_SIGNALS, OTHERS};
 use crate::failure::Failure;
 
 /// A choice of messages and signals; without any, everything.

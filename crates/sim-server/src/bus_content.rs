@@ -7,10 +7,10 @@ use j1939::ident::{self, CI, SOFT, VI};
 use j1939::{Id, J1939Error, MessageTable, Signal, Slot};
 
 /// The messages that have no fixed layout, by the standard's acronym.
-pub(super) const OTHERS: [(u32, &str); 5] =
+pub(crate) const OTHERS: [(u32, &str); 5] =
     [(DM1, "DM1"), (DM2, "DM2"), (VI, "VI"), (CI, "CI"), (SOFT, "SOFT")];
 /// The signals of those messages; codes and fields beyond are numbered.
-pub(super) const OTHER_SIGNALS: [&str; 11] = [
+pub(crate) const OTHER_SIGNALS: [&str; 11] = [
     "malfunction_lamp",
     "red_stop_lamp",
     "amber_warning_lamp",
@@ -26,7 +26,7 @@ pub(super) const OTHER_SIGNALS: [&str; 11] = [
 
 /// What a message says.
 #[derive(Debug, PartialEq)]
-pub(super) enum Content {
+pub(crate) enum Content {
     /// Its signals.
     Said(Vec<Item>),
     /// It cannot be decoded.
@@ -35,22 +35,22 @@ pub(super) enum Content {
 
 /// One signal.
 #[derive(Debug, PartialEq)]
-pub(super) struct Item {
-    pub(super) name: &'static str,
-    pub(super) unit: &'static str,
-    pub(super) slot: Slot<Said>,
+pub(crate) struct Item {
+    pub(crate) name: &'static str,
+    pub(crate) unit: &'static str,
+    pub(crate) slot: Slot<Said>,
 }
 
 /// What a signal says where it says something.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Said {
+pub(crate) enum Said {
     Number(f64),
     Code(i64),
     Text(Cow<'static, str>),
 }
 
 /// The name of a message and what it says; none for one that the table does not have.
-pub(super) fn read(id: Id, bytes: &[u8]) -> Option<(&'static str, Content)> {
+pub(crate) fn read(id: Id, bytes: &[u8]) -> Option<(&'static str, Content)> {
     if let Some(table) = MessageTable::of(id.pgn()) {
         let said = || table.signals.iter().map(|signal| of_signal(signal, bytes)).collect();
         let content = match table.check_length(id, bytes) {
