@@ -42,6 +42,8 @@ def test_a_viewer_is_greeted_chooses_its_channels_and_commands(
 ) -> None:
     with running(server, tmp_path, "--decider", "external") as run:
         page.goto(run.url)
+        # On a busy machine the first plan takes its time
+        page.wait_for_selector("#state:text-is('running')")
         heard = talk(page, enough_ms=800)
         hello = heard[0][1]
         assert (hello["kind"], hello["session"]) == ("hello", "default")
