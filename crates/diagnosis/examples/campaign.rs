@@ -37,6 +37,7 @@ const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [second
 
 #[derive(Default)]
 struct Table {
+    family: u32,
     cases: usize,
     first: usize,
     exact: usize,
@@ -222,7 +223,7 @@ impl Table {
         let stated = d.causes.iter().map(|c| (c.probability, truth.contains(&c.id)));
         self.stated.extend(stated.filter(|_| !deleted));
         let mut off = String::new();
-        for i in truth::intervals(hidden, d) {
+        for i in truth::intervals(self.family, hidden, d) {
             self.intervals += 1;
             self.covered += usize::from(i.covers());
             off += &format!(" z={:.1}", i.off());
@@ -352,7 +353,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let usual = Campaign { drives: 8, ..campaign };
     let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
     let baseline = Baseline::learn(&plant, &clean, &Serial)?;
-    let mut t = Table::default();
+    let mut t = Table { family, ..Table::default() };
     for case in 0..count.min(to) {
         let case_seed = seed.wrapping_mul(1_000_003) + case as u64;
         let mut rng = ChaCha8Rng::seed_from_u64(case_seed ^ 0x5eed);

@@ -216,7 +216,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h(
         "brake_fade",
         &[P::Fade],
-        &[P::FadeStart],
+        &[P::FadeStart, P::LiningLag],
         &[[-80.0, 0.0], [-40.0, 0.0], [0.0, 0.0], [60.0, 0.0]],
         &[C::EngineTorquePercent, C::EngineSpeedRpm, C::Gear, C::GradeFrac, C::BrakePressureKpa],
         0.05,
@@ -346,7 +346,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h(
         "payload_position",
         &[P::PayloadX],
-        &[P::StiffnessFollows],
+        &[P::StiffnessFollows, P::PayloadSpread],
         &[[0.0, 0.0], [1.0, 0.0]],
         &[C::SteeringWheelRad, C::YawRateRadS],
         0.15,

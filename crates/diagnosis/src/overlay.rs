@@ -93,6 +93,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("brake_gain", "gain_scale") => Times("brake.gain_scale_coeff"),
         ("brake_fade", "loss_per_100_k") => Plus("brake.fade_1_k", 0.01),
         ("brake_fade", "start_offset_k") => Plus("brake.fade_from_k", 1.0),
+        ("brake_fade", "lining_lag_s") => Plus("brake.lining_lag_s", 1.0),
         ("brake_delay", "delay_s") => Plus("brake.dead_time_s", 1.0),
         ("hidden_retarder", "torque_per_stage_nm") => Carry::Retarder,
         ("hidden_retarder", "force_n_per_m_s2") => Carry::BrakeDemand,
@@ -118,6 +119,9 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         }
         ("cornering_stiffness_trailer", "stiffness_scale") => {
             Times("lateral.tyres.stiffness_scale[2]")
+        }
+        ("payload_position", "gyration_squared_scale") => {
+            Times("lateral.payload.yaw_gyration_squared_m2")
         }
         ("payload_position", "shift_rearward_m") => Plus("lateral.payload.cg_behind_hitch_m", 1.0),
         ("road_bank", "bank_rad") => Plus("instruments.bank_offset_rad", 1.0),

@@ -81,10 +81,12 @@ pub(crate) enum P {
     FuelFlowPower,
     Co2Scale,
     Co2Power,
+    LiningLag,
+    PayloadSpread,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 72;
+pub(crate) const PARAMS: usize = 74;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -207,6 +209,9 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::FuelFlowPower, "rate_exponent", "1", (0.7, -1.0, 3.0, 0.1), 0.0, 0.0),
     s(P::Co2Scale, "scale", "1", (0.1, -0.5, 1.0, 0.02), 0.01, 0.0),
     s(P::Co2Power, "rate_exponent", "1", (0.7, -1.0, 3.0, 0.1), 0.0, 0.0),
+    s(P::LiningLag, "lining_lag_s", "s", (20.0, 0.0, 120.0, 3.0), 0.0, 0.0),
+    // Loads of 8 to 13.6 m, evenly spread: length²/12 is 0.5 to 1.6 of the usual 9.9 m².
+    s(P::PayloadSpread, "gyration_squared_scale", "1", (0.25, -0.6, 0.8, 0.05), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -232,6 +237,8 @@ impl Spec {
                 | P::FuelLowOver
                 | P::RetarderFrom
                 | P::FadeStart
+                | P::LiningLag
+                | P::PayloadSpread
                 | P::StiffnessFollows
                 | P::StiffnessFollowsMass
                 | P::TurboStart
@@ -252,7 +259,7 @@ impl P {
     /// A fit moves it no farther than to the nearest of many dips: it is fitted from all of its
     /// starts.
     pub(crate) fn is_stuck(self) -> bool {
-        matches!(self, Self::RetarderFrom | Self::FanStart)
+        matches!(self, Self::RetarderFrom | Self::FanStart | Self::FadeStart)
     }
 
     /// A shape that is one of a few in truth.

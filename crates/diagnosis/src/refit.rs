@@ -168,6 +168,29 @@ impl Free {
         step
     }
 
+    /// The step that solves the normal equations, without the parameters that would leave their
+    /// bounds at once: a step with them leads nowhere.
+    fn solved(&self, Normal { a, b }: &Normal, theta: &Theta) -> Option<DVector<f64>> {
+        let mut inside: Vec<usize> = (0..self.params.len()).collect();
+        loop {
+            let (own_a, own_b) = (evidence::sub(a, &inside), evidence::pick(b, &inside));
+            let own = own_a.cholesky()?.solve(&own_b);
+            let leaves = |(j, d): (&usize, &f64)| {
+                let p = self.params[*j];
+                let (s, x) = (p.spec(), theta[p as usize] - self.zero[p as usize]);
+                x <= s.lo && *d < 0.0 || x >= s.hi && *d > 0.0
+            };
+            let stay = inside.iter().zip(own.iter()).filter(|x| !leaves(*x));
+            let left: Vec<usize> = stay.map(|(j, _)| *j).collect();
+            if left.len() == inside.len() || left.is_empty() {
+                let mut step = DVector::zeros(self.params.len());
+                inside.iter().zip(own.iter()).for_each(|(j, d)| step[*j] = *d);
+                return Some(step);
+            }
+            inside = left;
+        }
+    }
+
     /// `factor` of a step from `theta`, within the bounds.
     fn moved(&self, theta: &Theta, step: &DVector<f64>, factor: f64) -> Theta {
         let mut to = *theta;
@@ -243,24 +266,24 @@ impl dyn Evidence + '_ {
     /// The common step with halving, or the newest member's alone where that leads further; none
     /// where nothing improves. The outer `None`: the normal equations cannot be solved.
     fn best_step(&self, free: &Free, at: &Standing) -> Option<Option<Step>> {
-        let Normal { a, b } = free.normal(&at.gram, &at.theta);
+        let normal = free.normal(&at.gram, &at.theta);
+        let (a, b) = (&normal.a, &normal.b);
         let tried = |step: &DVector<f64>, factor: f64| {
             let to = free.moved(&at.theta, step, factor);
             // Both ends of a step are compared in the metric of its beginning.
             let gram = self.seen(free, &to, &at.along, &at.theta);
             let cost = gram.map_or(f64::INFINITY, |g| free.cost(g[0].total().2, &to));
-            let curve = (&a * step).dot(step);
+            let curve = (a * step).dot(step);
             let promised = 2.0 * factor * b.dot(step) - factor * factor * curve;
             Step { to, improved: at.cost - cost, promised }
         };
-        let step = free.limited(a.clone().cholesky()?.solve(&b));
+        let step = free.limited(free.solved(&normal, &at.theta)?);
         let mut found =
             HALVINGS.iter().map(|factor| tried(&step, *factor)).find(|s| s.improved > 0.0);
         let poor = found.is_none_or(|s| s.improved < BROKEN_PROMISE * b.dot(&step));
         if poor && !free.newest.is_empty() {
             // The others stand at a kink of theirs, where no common step helps.
-            let (own_a, own_b) =
-                (evidence::sub(&a, &free.newest), evidence::pick(&b, &free.newest));
+            let (own_a, own_b) = (evidence::sub(a, &free.newest), evidence::pick(b, &free.newest));
             let own = own_a.cholesky()?.solve(&own_b);
             let mut alone = DVector::zeros(free.params.len());
             free.newest.iter().zip(own.iter()).for_each(|(j, d)| alone[*j] = *d);

@@ -63,7 +63,9 @@ pub(crate) fn cause(id: &str, x: f64) -> String {
         ),
         "brake_gain" => scaled("Brake force per pressure"),
         "engine_brake_torque" => scaled("The engine brake's torque"),
-        "brake_fade" => format!("Hot brakes lose {percent} % of their force per 100 K."),
+        "brake_fade" => format!(
+            "Hot brakes lose {percent} % of their cold force per 100 K above where they fade."
+        ),
         "brake_delay" => format!("The brakes answer {x:.2} s later than modelled."),
         "hidden_retarder" => "A retarder acts that the model does not have.".to_owned(),
         "fuel_flow_scale" => meter("fuel", x),

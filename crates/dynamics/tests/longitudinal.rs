@@ -224,6 +224,22 @@ fn hot_brakes_fade_and_cool_again() {
     assert!(cooled.brake.temperature_k[1] < 294.0);
 }
 
+/// After a long descent discs that are held hot warm the linings by `1 - exp(-t/tau)`; without a lag
+/// linings are as hot as the discs.
+#[test]
+fn linings_follow_the_discs_with_their_lag() {
+    let after = |lag_s: f64| {
+        let m = changed(36_000.0, &[("brake.lining_lag_s", lag_s), ("brake.cooling_s", 1e5)]);
+        let mut s = m.initial_state(0.0, 0.0, 0.0, 20.0);
+        s.brake.temperature_k = [500.0; 3];
+        run(&m, &s, &pedal(0.3), &RoadPatch::default(), 30.0).brake
+    };
+    let behind = after(30.0);
+    let expected = 500.0 - (500.0 - 293.15) * (-1.0_f64).exp();
+    assert!((behind.lining_k[1] - expected).abs() < 0.5, "{} {expected}", behind.lining_k[1]);
+    assert_eq!(after(0.0).lining_k, after(0.0).temperature_k);
+}
+
 #[test]
 fn thin_air_takes_power_where_the_truck_file_says_so() {
     let m = changed(0.0, &[("engine.derate_altitude_1_m", 1e-4)]);

@@ -52,7 +52,7 @@ impl Case {
             case,
             stated: stated.collect(),
             verdict: format!("{:?}", d.verdict),
-            intervals: intervals(hidden, d),
+            intervals: intervals(family, hidden, d),
             hidden: words,
         }
     }

@@ -28,8 +28,9 @@ impl Interval {
 }
 
 /// Keys with the value that means nothing is wrong, the sign of the hidden size, and the hidden
-/// size itself. One of several keys may be fitted (gates of a retarder, temperatures of a derating).
-fn keys(id: &str, size: f64, shape: &Shape) -> Vec<(&'static str, f64, f64, f64)> {
+/// size itself. One of several keys may be fitted (gates of a retarder, temperatures of a derating). A loss
+/// per 100 K is what is lost 100 K above where fade begins: the generators' laws are curves.
+fn keys((id, family): (&str, u32), size: f64, shape: &Shape) -> Vec<(&'static str, f64, f64, f64)> {
     let one = |key, neutral, sign| vec![(key, neutral, sign, size)];
     match id {
         "rolling_resistance" => one("coefficient_scale", 1.0, 1.0),
@@ -58,7 +59,10 @@ fn keys(id: &str, size: f64, shape: &Shape) -> Vec<(&'static str, f64, f64, f64)
         "shift_duration" => one("extra_time_s", 0.0, 1.0),
         "fuel_map_low_load" => one("extra_frac", 0.0, 1.0),
         "brake_gain" => one("gain_scale", 1.0, 1.0),
-        "brake_fade" => one("loss_per_100_k", 0.0, 1.0),
+        "brake_fade" => {
+            let lost = if family == 1 { size / (1.0 + size) } else { 1.0 - (-size).exp() };
+            vec![("loss_per_100_k", 0.0, 1.0, lost)]
+        }
         "hidden_retarder" => {
             vec![("torque_nm", 0.0, 1.0, size), ("torque_per_stage_nm", 0.0, 1.0, size)]
         }
@@ -79,12 +83,12 @@ fn keys(id: &str, size: f64, shape: &Shape) -> Vec<(&'static str, f64, f64, f64)
 }
 
 /// The sizes that were named of what was hidden.
-pub(crate) fn intervals(hidden: &[Effect], d: &Diagnosis) -> Vec<Interval> {
+pub(crate) fn intervals(family: u32, hidden: &[Effect], d: &Diagnosis) -> Vec<Interval> {
     let mut out = Vec::new();
     for e in hidden {
         let Effect::Cause { id, size, shape } = e else { continue };
         let Some(cause) = d.causes.iter().find(|c| c.id == *id) else { continue };
-        for (key, neutral, sign, hidden) in keys(id, *size, shape) {
+        for (key, neutral, sign, hidden) in keys((id, family), *size, shape) {
             if let Some(p) = cause.parameters.get(key) {
                 out.push(Interval {
                     id: (*id).to_owned(),

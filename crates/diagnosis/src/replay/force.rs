@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use dynamics::SUBSTEP_S;
-use dynamics::effects::brake::friction_left_frac;
+use dynamics::effects::brake::{BrakeParameters, friction_left_frac};
 use dynamics::effects::driveline::{from_speed_frac, with_losses_n};
 use dynamics::effects::resistance::{area_at_yaw_m2, cold_factor, drag_n, grade_n, rolling_n};
 use tractrix_core::ZERO_DEGC_K;
@@ -127,7 +127,7 @@ impl<'a> Longitudinal<'a> {
             parasitic_n: resistance.parasitic_force_n + at(P::DragBrake),
             grade: d.grade_shifted(at(P::MapShift)),
             service_n: service_n(d, plant, at(P::PressureLag)),
-            heat: (fade.0 != 0.0).then(|| brake_heat(d, plant, t, fade)),
+            heat: (fade.0 != 0.0).then(|| lining_heat(d, plant, t, fade)),
             fan: (fan_w != 0.0).then(|| fan(d, plant, t)),
             retarder_n: retarder_n(d, plant, at(P::RetarderStage)),
             cold_left: (cold != 0.0 && !d.warm).then(|| cold_left(d, plant, t)),
@@ -217,9 +217,9 @@ fn service_n(d: &Prepared, plant: &Plant, lag_s: f64) -> Arc<[f64]> {
     })
 }
 
-/// Heating of the brakes above the air at the measured speed, K, by the force that they have: faded
-/// brakes heat less.
-fn brake_heat(
+/// Heating of the linings above the air at the measured speed, K: behind that of the discs, which is
+/// by the force that they have; faded brakes heat less.
+fn lining_heat(
     d: &Prepared,
     plant: &Plant,
     t: &Theta,
@@ -227,15 +227,19 @@ fn brake_heat(
 ) -> Arc<[f64]> {
     let [lag, speed, gain] = [P::PressureLag, P::SpeedScale, P::BrakeGain].map(|p| t[p as usize]);
     let service_n = service_n(d, plant, lag);
-    d.profiles.get(Kind::BrakeHeat, [lag, speed, gain, loss_1_k, from_k], || {
+    let behind_s = plant.truck.brake.lining_lag_s + t[P::LiningLag as usize];
+    let key = [lag, speed, gain, loss_1_k, from_k, behind_s];
+    d.profiles.get(Kind::BrakeHeat, key, || {
         let brake = &plant.truck.brake;
-        let mut heat_k = 0.0;
+        let (mut disc_k, mut lining_k) = (0.0, 0.0);
         let steps =
             d.speed.iter().zip(&d.ambient).zip(service_n.iter()).map(|((v, air), force_n)| {
-                let before = heat_k;
-                let left = friction_left_frac(loss_1_k, heat_k + air + ZERO_DEGC_K, from_k);
+                let before = lining_k;
+                let left = friction_left_frac(loss_1_k, lining_k + air + ZERO_DEGC_K, from_k);
                 let power_w = (1.0 + gain) * force_n * left * v / (1.0 + speed);
-                heat_k = brake.temperature_step_k(heat_k, power_w, 1.0, 0.0, Drive::STEP_S);
+                disc_k = brake.temperature_step_k(disc_k, power_w, 1.0, 0.0, Drive::STEP_S);
+                lining_k =
+                    BrakeParameters::lining_step_k(lining_k, disc_k, behind_s, Drive::STEP_S);
                 before
             });
         pad(steps, d.balance.padded)

@@ -20,6 +20,7 @@ pub(crate) fn loaded(d: &Prepared, plant: &Plant, t: &Theta) -> LateralParameter
     let mass = d.mass_kg * (1.0 + t[P::Mass as usize]);
     p.payload.mass_kg = (mass - p.tractor.mass_kg - p.trailer.mass_kg).max(0.0);
     p.payload.cg_behind_hitch_m += t[P::PayloadX as usize];
+    p.payload.yaw_gyration_squared_m2 *= 1.0 + t[P::PayloadSpread as usize];
     p
 }
 

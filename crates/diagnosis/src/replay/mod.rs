@@ -181,6 +181,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::BrakeGain
         | P::Fade
         | P::FadeStart
+        | P::LiningLag
         | P::RetarderStage
         | P::RetarderBrake
         | P::RetarderCoast
@@ -219,6 +220,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::CDrive
         | P::CTrailer
         | P::PayloadX
+        | P::PayloadSpread
         | P::StiffnessFollows
         | P::StiffnessFollowsMass
         | P::WindShare

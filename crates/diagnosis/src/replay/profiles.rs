@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex};
 pub(super) enum Kind {
     /// Force of cold brakes, N; over the lag.
     Service,
-    /// Heating of the brakes above the air, K; over lag, speed scale, gain and fade.
+    /// Heating of the linings above the air, K; over lag, speed scale, gain, fade and their own lag.
     BrakeHeat,
     /// How far the fan is on, 0 to 1; over start and hysteresis.
     Fan,
@@ -31,7 +31,7 @@ pub(super) enum Kind {
 const KEPT: usize = 28;
 
 /// Values of the parameters that a signal depends on, the rest zero.
-type Key = [u64; 5];
+type Key = [u64; 6];
 
 type Entry = (Kind, Key, Arc<[f64]>);
 
@@ -40,7 +40,7 @@ type Entry = (Kind, Key, Arc<[f64]>);
 pub(crate) struct Profiles(Mutex<Vec<Entry>>, Mutex<Vec<Vec<f64>>>);
 
 impl Profiles {
-    /// The signal at up to five parameter values, built where it is not kept.
+    /// The signal at up to six parameter values, built where it is not kept.
     pub(super) fn get<const N: usize>(
         &self,
         kind: Kind,

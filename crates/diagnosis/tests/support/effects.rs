@@ -238,6 +238,8 @@ impl Acting {
 pub(crate) struct Memory {
     fan_goal: f64,
     fan: f64,
+    /// Brake linings over the air, K.
+    lining_k: f64,
     pub(crate) gust: f64,
 }
 
@@ -283,7 +285,10 @@ pub(crate) fn act(
             a.derate *= 1.0 - (0.1 * size * over.max(0.0)).min(0.6);
         }
         "brake_fade" => {
-            let over = now.ambient_degc + now.brake_k - shape.at(0, 90.0, 200.0);
+            // Linings as hot as the discs, or behind them.
+            let tau = if shape.choice(1, 2) == 0 { 0.0 } else { shape.at(2, 5.0, 40.0) };
+            m.lining_k += (now.brake_k - m.lining_k) * (1.0 - (-dt / f64::max(tau, 1e-3)).exp());
+            let over = now.ambient_degc + m.lining_k - shape.at(0, 90.0, 200.0);
             let loss = 0.01 * size * over.max(0.0);
             a.friction *= 1.0 - loss / (1.0 + loss);
         }

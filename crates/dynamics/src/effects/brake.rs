@@ -4,8 +4,9 @@
 //! p_demand = m a_demand / K          (or a table over deceleration and mass)
 //! p        dead time, then first-order lag within the fill and vent rates, per axle group
 //! a_asked  a_demand + a_i,  da_i/dt = k_i (a_demand - a_felt) within 0 to a limit (an option)
-//! F        = K p mu(T),  mu(T) = 1 - k_fade max(0, T - T_0), within the road's grip
+//! F        = K p mu(T_l),  mu(T) = 1 - k_fade max(0, T - T_0), within the road's grip
 //! C dT/dt  = F v - C (T - T_air)/tau
+//! dT_l/dt  = (T - T_l)/tau_l         linings behind the discs
 //! ```
 //! The pressure of an axle group follows its static load share (load-dependent distribution,
 //! ECE R13), so that all axles use the same grip. The anti-lock system holds each group's force
@@ -72,6 +73,10 @@ pub struct BrakeParameters {
     /// Loss of force per kelvin above it, 1/K.
     #[serde(default)]
     pub fade_1_k: f64,
+    /// Lag of the linings' temperature behind that of the discs, s (a lining's outer 3 to 10 mm at a
+    /// diffusivity of 0.5 to 1 mm²/s: some 5 to 80 s); 0: none.
+    #[serde(default)]
+    pub lining_lag_s: f64,
     /// Air that a full application takes, share of the reservoir.
     #[serde(default = "air_per_fill")]
     pub air_per_fill_frac: f64,
@@ -85,6 +90,9 @@ fn one() -> f64 {
 }
 fn fade_from_k() -> f64 {
     423.15
+}
+fn usual_k() -> [f64; GROUPS] {
+    [BrakeParameters::START_K; GROUPS]
 }
 fn air_per_fill() -> f64 {
     0.04
@@ -113,6 +121,9 @@ pub struct BrakeState {
     pub pressure_pa: [f64; GROUPS],
     /// Disc temperature per axle group, K.
     pub temperature_k: [f64; GROUPS],
+    /// Temperature of the linings per axle group, K.
+    #[serde(default = "usual_k")]
+    pub lining_k: [f64; GROUPS],
     /// Air in the reservoir, 0 to 1.
     pub reservoir_frac: f64,
     /// Deceleration that the control unit's loop adds to the demand, m/s².
@@ -148,6 +159,7 @@ impl BrakeParameters {
         b.within("cooling_s", self.cooling_s, 10.0, 1e5);
         b.within("fade_from_k", self.fade_from_k, 300.0, 1_500.0);
         b.within("fade_1_k", self.fade_1_k, 0.0, 0.02);
+        b.within("lining_lag_s", self.lining_lag_s, 0.0, 600.0);
         b.within("air_per_fill_frac", self.air_per_fill_frac, 0.0, 1.0);
         b.within("refill_1_s", self.refill_1_s, 0.0, 1.0);
         b.violations
@@ -237,16 +249,15 @@ impl BrakeParameters {
         (pressure_pa + change).max(0.0)
     }
 
-    /// Friction left in hot linings, 0 to 1.
-    #[must_use]
-    pub fn fade_frac(&self, temperature_k: f64) -> f64 {
-        friction_left_frac(self.fade_1_k, temperature_k, self.fade_from_k)
-    }
+    /// Temperature of discs and linings before the first braking, K.
+    pub const START_K: f64 = 293.15;
 
-    /// Braking force of a group, N, positive slows: `share` of K at its pressure, faded.
+    /// Braking force of a group, N, positive slows: `share` of K at its pressure, with linings as hot
+    /// as `lining_k`.
     #[must_use]
-    pub fn force_n(&self, share: f64, pressure_pa: f64, temperature_k: f64) -> f64 {
-        self.cold_force_n(share, pressure_pa) * self.fade_frac(temperature_k)
+    pub fn force_n(&self, share: f64, pressure_pa: f64, lining_k: f64) -> f64 {
+        self.cold_force_n(share, pressure_pa)
+            * friction_left_frac(self.fade_1_k, lining_k, self.fade_from_k)
     }
 
     /// The same with linings that do not fade.
@@ -268,5 +279,15 @@ impl BrakeParameters {
     ) -> f64 {
         let heating = power_w / (self.heat_capacity_j_k * share);
         temperature_k + dt_s * (heating - (temperature_k - air_k) / self.cooling_s)
+    }
+
+    /// Temperature of the linings after `dt_s` on discs of `disc_k`, K; `lag_s` behind them.
+    #[inline]
+    #[must_use]
+    pub fn lining_step_k(lining_k: f64, disc_k: f64, lag_s: f64, dt_s: f64) -> f64 {
+        if lag_s <= 0.0 {
+            return disc_k;
+        }
+        disc_k + (lining_k - disc_k) * libm::exp(-dt_s / lag_s)
     }
 }

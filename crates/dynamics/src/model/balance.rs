@@ -4,7 +4,7 @@ use tractrix_core::{Command, GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::powertrain::Wheel;
 use super::{GROUP_AXLES, STANDSTILL_M_S, TruckModel};
-use crate::effects::brake::GROUPS;
+use crate::effects::brake::{BrakeParameters, GROUPS};
 use crate::effects::resistance::{AirFlow, air_density_kg_m3, grade_n};
 use crate::effects::table::{self, TableSignal};
 use crate::lateral::{AXLES, BodyForce, LateralInputs};
@@ -30,13 +30,19 @@ impl TruckModel {
         for g in 0..GROUPS {
             let share = self.brake_share[g];
             let pressure = b.acting_pressure_pa(&s.brake, g);
-            let force = b.force_n(share, pressure, s.brake.temperature_k[g]);
+            let force = b.force_n(share, pressure, s.brake.lining_k[g]);
             let power = force * s.speed_m_s.abs();
             s.brake.temperature_k[g] = b.temperature_step_k(
                 s.brake.temperature_k[g],
                 power,
                 share,
                 patch.air_temperature_k,
+                SUBSTEP_S,
+            );
+            s.brake.lining_k[g] = BrakeParameters::lining_step_k(
+                s.brake.lining_k[g],
+                s.brake.temperature_k[g],
+                b.lining_lag_s,
                 SUBSTEP_S,
             );
         }
@@ -77,7 +83,7 @@ impl TruckModel {
         for (g, axles) in GROUP_AXLES.into_iter().enumerate() {
             let share = self.brake_share[g];
             let pressure = b.acting_pressure_pa(&s.brake, g);
-            let wanted = b.force_n(share, pressure, s.brake.temperature_k[g]);
+            let wanted = b.force_n(share, pressure, s.brake.lining_k[g]);
             let used_n = if g == 1 { driveline_n } else { 0.0 };
             let held = wanted.min(grip * share * self.mass_kg * GRAVITY_M_S2 - used_n);
             brake_n += held;

@@ -14,7 +14,7 @@ mod powertrain;
 
 use tractrix_core::{BrakeMode, Command, Curve, RPM_PER_RAD_S};
 
-use crate::effects::brake::GROUPS;
+use crate::effects::brake::{BrakeParameters, GROUPS};
 use crate::effects::cooling::HeatSources;
 use crate::effects::engine::Engine;
 use crate::effects::shift::ShiftState;
@@ -145,7 +145,8 @@ impl TruckModel {
                 ..ShiftState::default()
             },
             brake: crate::effects::brake::BrakeState {
-                temperature_k: [293.15; GROUPS],
+                temperature_k: [BrakeParameters::START_K; GROUPS],
+                lining_k: [BrakeParameters::START_K; GROUPS],
                 reservoir_frac: 1.0,
                 ..Default::default()
             },
