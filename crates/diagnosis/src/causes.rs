@@ -146,19 +146,28 @@ pub(crate) fn causes(
     compared.model(Vec::new(), 0.0);
     compared.beside();
     let beside = compared.functions.len();
+    let without: Vec<Option<Fit>> = (0..fit.set.len())
+        .map(|i| {
+            let (fewer, theta) = evidence.without(fit, i);
+            if fewer.is_empty() {
+                Some(empty.clone())
+            } else {
+                evidence.fit(&fewer, &theta, empty.norm)
+            }
+        })
+        .collect();
+    let lost = |f: &Option<Fit>| fit.log_z - f.as_ref().map_or(0.0, |f| f.log_z);
+    // The cause that the others stand beside.
+    let main = (0..without.len()).max_by(|a, b| lost(&without[*a]).total_cmp(&lost(&without[*b])));
     let mut out = Vec::new();
-    for (i, h) in fit.set.iter().enumerate() {
+    for (i, (h, without)) in fit.set.iter().zip(&without).enumerate() {
         let hyp = &CATALOGUE[*h];
-        let (fewer, theta) = evidence.without(fit, i);
-        let without = if fewer.is_empty() {
-            Some(empty.clone())
-        } else {
-            evidence.fit(&fewer, &theta, empty.norm)
-        };
-        let lost_nats = fit.log_z - without.as_ref().map_or(0.0, |f| f.log_z);
+        let lost_nats = lost(without);
         let (mut confused_with, mut rivalled) = (Vec::new(), false);
-        if let Some(fewer) = &without {
-            compared.model(ids(&fewer.set), fewer.log_z);
+        if let Some(fewer) = without {
+            let worth =
+                if main == Some(i) { lost_nats } else { evidence.beside(fit, i, lost_nats) };
+            compared.model(ids(&fewer.set), fit.log_z - worth);
             compared.functions(i, fewer, bare);
             (confused_with, rivalled) = compared.rivals(i, fewer, lost_nats, open);
         }

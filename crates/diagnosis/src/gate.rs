@@ -47,6 +47,14 @@ impl dyn Evidence + '_ {
     /// poorly, so it is drawn towards one by [`DISPERSION_PRIOR`] drives' worth, and the interval
     /// gets the t-factor of what is left.
     pub(crate) fn variances(&self, fit: &Fit) -> Vec<f64> {
+        let freedom = fit.gram.per_drive.len() as f64 - 1.0 + DISPERSION_PRIOR;
+        let t_factor = 1.0 + 1.2 / freedom;
+        let dispersions = self.dispersions(fit).into_iter().enumerate();
+        dispersions.map(|(j, phi)| fit.covariance[(j, j)] * phi * t_factor * t_factor).collect()
+    }
+
+    /// Over-dispersion of the drives about every free parameter.
+    fn dispersions(&self, fit: &Fit) -> Vec<f64> {
         let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
         let (mut seen, mut expected) = (vec![0.0; k], vec![0.0; k]);
         for (g, score) in fit.gram.per_drive.iter().zip(self.pulls(fit)) {
@@ -59,16 +67,26 @@ impl dyn Evidence + '_ {
             }
         }
         let freedom = drives - 1.0 + DISPERSION_PRIOR;
-        let t_factor = 1.0 + 1.2 / freedom;
         (0..k)
             .map(|j| {
                 // What the drives say nothing about keeps its prior.
                 let told = expected[j] > 1e-9 * fit.covariance[(j, j)];
                 let ratio = if told { seen[j] / expected[j] * drives } else { drives };
-                let dispersion = (DISPERSION_PRIOR + ratio) / freedom;
-                fit.covariance[(j, j)] * dispersion.max(0.8) * t_factor * t_factor
+                ((DISPERSION_PRIOR + ratio) / freedom).max(0.8)
             })
             .collect()
+    }
+
+    /// What `nats` of the `i`-th member are worth beside another cause. Drives in order have not shown
+    /// how what is left beside that one scatters, so that it is known from these few drives alone:
+    /// Student's t with the over-dispersion of the member's sizes,
+    /// `n/2 ln(1 + 2 nats / (n phi))` of `n` degrees of freedom, which is `nats / phi` for many.
+    pub(crate) fn beside(&self, fit: &Fit, member: usize, nats: f64) -> f64 {
+        let freedom = self.drives() as f64 - 1.0 + DISPERSION_PRIOR;
+        let sizes = CATALOGUE[fit.set[member]].sizes;
+        let all = fit.free.iter().zip(self.dispersions(fit));
+        let most = all.filter(|(p, _)| sizes.contains(p)).map(|x| x.1).fold(1.0, f64::max);
+        0.5 * freedom * (2.0 * nats.max(0.0) / (freedom * most)).ln_1p()
     }
 
     /// Gradient of every drive at the fit, less its part of the prior's.

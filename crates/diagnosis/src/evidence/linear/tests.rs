@@ -197,3 +197,29 @@ fn every_drive_says_which_size_it_alone_would_choose() {
         assert!((sizes[0].sigma * STRONG - 1.0).abs() < 0.1, "{i}: {sizes:?}");
     }
 }
+
+/// Beside another cause the scatter is known from these drives alone: a little that they agree about is
+/// worth less than it says, and what they contradict each other about still less.
+#[test]
+fn what_stands_beside_a_cause_is_worth_what_few_drives_can_say() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let worth = |sizes: [f64; 6]| {
+        let of = |x: &f64| plus(&times(&columns[0].1, 0.3), &times(&columns[1].1, *x));
+        let drives = sizes.iter().map(|x| drive(of(x), &columns)).collect();
+        let problem = LinearProblem::new(drives);
+        let evidence: &dyn Evidence = &problem;
+        let set = [ROLLING, DRAG].map(LinearProblem::cause);
+        let zero = [0.0; PARAMS];
+        let norm = evidence.gram(&zero, &[]).total().2;
+        let both = evidence.fit(&set, &zero, norm).unwrap();
+        let one = evidence.fit(&set[..1], &zero, norm).unwrap();
+        let nats = both.log_z - one.log_z;
+        (nats, evidence.beside(&both, 1, nats), evidence.beside(&both, 1, 1e4))
+    };
+    let (nats, agreed, much) = worth([0.06; 6]);
+    assert!((9.0..13.0).contains(&nats), "{nats}");
+    assert!((agreed - 4.5 * (2.0 * nats / 9.0).ln_1p()).abs() < 1e-9, "{agreed}");
+    assert!(much > 20.0, "{much}");
+    let (nats, contradicted, _) = worth([0.13, -0.01, 0.13, -0.01, 0.13, -0.01]);
+    assert!(nats > 9.0 && contradicted < 0.8 * agreed, "{nats} {contradicted} {agreed}");
+}
