@@ -72,17 +72,25 @@ pub(super) struct Since {
     since: Option<u64>,
 }
 
+/// The number that is asked from; 0: all.
+fn number(since: Result<Query<Since>, QueryRejection>) -> Result<u64, Box<Response>> {
+    match since {
+        Ok(Query(Since { since })) => Ok(since.unwrap_or(0)),
+        Err(why) => Err(Box::new(problem::wrong_query(&why.body_text()))),
+    }
+}
+
 /// The last frames, 20 a second of wall time; 200 are kept.
 #[utoipa::path(get, path = "/frames", params(("session" = String, Path, description = "Id of a session; `run` has `default`"), Since), responses((status = 200, body = Object)))]
 pub(super) async fn frames(
     Of(shared): Of,
     since: Result<Query<Since>, QueryRejection>,
 ) -> Response {
-    let Query(Since { since }) = match since {
+    let since = match number(since) {
         Ok(since) => since,
-        Err(why) => return problem::wrong_query(&why.body_text()),
+        Err(refused) => return *refused,
     };
-    let (frames, next) = shared.frames_since(since.unwrap_or(0));
+    let (frames, next) = shared.frames_since(since);
     let body = format!(
         "{{\"schema\":{SCHEMA},\"next\":{next},\"frames\":[{}]}}",
         frames.iter().map(|frame| &**frame).collect::<Vec<_>>().join(",")
@@ -90,18 +98,18 @@ pub(super) async fn frames(
     json(StatusCode::OK, body)
 }
 
-/// What happened: runs, states, manoeuvres, refusals, the guard, wheels off the road, collisions;
-/// the last 1,000.
+/// What happened: runs, states, manoeuvres, refusals, the guard, settings and faults, wheels off the
+/// road, collisions; the last 1,000.
 #[utoipa::path(get, path = "/events", params(("session" = String, Path, description = "Id of a session; `run` has `default`"), Since), responses((status = 200, body = Object)))]
 pub(super) async fn events(
     Of(shared): Of,
     since: Result<Query<Since>, QueryRejection>,
 ) -> Response {
-    let Query(Since { since }) = match since {
+    let since = match number(since) {
         Ok(since) => since,
-        Err(why) => return problem::wrong_query(&why.body_text()),
+        Err(refused) => return *refused,
     };
-    let (events, next) = shared.events().since(since.unwrap_or(0));
+    let (events, next) = shared.events().since(since);
     let body = serde_json::json!({ "schema": SCHEMA, "next": next, "events": events });
     json(StatusCode::OK, body.to_string())
 }
