@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -103,6 +104,35 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tractrix.Client
         with tractrix.Client(address.group()) as client:
             yield client
         process.kill()
+
+
+def test_a_session_is_changed_driven_and_broken_under_way(
+    server: tractrix.Client,
+) -> None:
+    session = server.create("flat", seed=3, pace="max", vehicle="bus")
+    session.pause()
+    session.set_decider("mobil")
+    session.set_speed_planner("predictive")
+    session.step(200)
+    for _ in range(50):
+        session.external(-1.0, 0.0)
+        session.step(2)
+    session.release()
+    with pytest.raises(tractrix.Refused, match="expected localisation"):
+        session.fault("wings")
+    session.fault("engine")
+    session.step(100)
+    deadline = time.monotonic() + 10.0
+    while not session.bus()["faults"]:
+        assert time.monotonic() < deadline
+    names = {message["name"] for message in session.bus()["messages"]}
+    assert {"EEC1", "XBR"} <= names
+    run = session.state()["run"]
+    assert (run["decider"], run["speed_planner"]) == ("mobil", "predictive")
+    assert run["faults"] == ["engine"] and not run["driven_from_outside"]
+    name = session.info()["run"]
+    session.end()
+    server.run(name).remove()
 
 
 def test_sessions_begin_end_and_leave_runs(

@@ -125,7 +125,8 @@ class Client:
             state: Standing still, or playing.
             pace: Simulated seconds per second.
             **changes: As the options of the command line: `road`, `truck`, `payload_kg`,
-                `duration_s`, `allow_off_road`, `traffic`, `mode`, `decider`, `speed_planner`.
+                `duration_s`, `allow_off_road`, `traffic`, `mode`, `decider`, `speed_planner`,
+                `vehicle` (`direct`, or over a `bus` in memory).
 
         Raises:
             Refused: `too_many_sessions`, `unusable`, `outside`, `wrong_body`.
@@ -303,6 +304,10 @@ class Session:
     def summary(self) -> dict[str, Any]:
         """The summary so far, of the latest frame; the final one after the end."""
         return self._client._get(f"{self._path}/summary")
+
+    def bus(self) -> dict[str, Any]:
+        """Messages with rate, age and signals, addresses and faults of a truck on a bus."""
+        return self._client._get(f"{self._path}/bus")
 
     def road(self) -> dict[str, Any]:
         """Lane borders, markings, profile, the truck's lengths."""
