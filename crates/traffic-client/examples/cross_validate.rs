@@ -5,8 +5,9 @@
 //! (1: learn from all, and judge on the same) and prints a line per recording: Kolmogorov-Smirnov
 //! distances of speed and gap with the measured start and arrivals (`bounded`), that of the speeds
 //! if everyone kept the speed that they came with (`kept`), those of speed and gap with flow and
-//! speeds at both ends only (`free`; mean and range of eight seeds), and the mean distance of the
-//! speeds from the other recordings of its name up to the first digit (`others`).
+//! speeds at both ends only (`free`: eight seeds together, as bounded traffic is four; `alone`: mean
+//! and range of single seeds; `among`: mean distance of the seeds from each other), and the mean
+//! distance of the speeds from the other recordings of its name up to the first digit (`others`).
 #![allow(clippy::disallowed_macros, reason = "a measurement program")]
 
 use std::error::Error;
@@ -64,7 +65,10 @@ impl Looked {
 struct Verdict {
     bounded: [f64; 2],
     kept: f64,
-    free: Vec<[f64; 2]>,
+    free: [f64; 2],
+    /// Distances of the speeds of single seeds, and the mean distance of these from each other.
+    alone: Vec<f64>,
+    among: f64,
     others: Option<f64>,
     lane_changes_1_km: [f64; 3],
 }
@@ -88,10 +92,19 @@ fn judge(one: &Looked, all: &[Looked], found: &Calibration) -> Result<Verdict, B
         .map(|o| one.distance(&o.samples, Quantity::Speed))
         .collect();
     let free_changes = free.iter().map(Samples::lane_changes_1_km).sum::<f64>();
+    let mut together = free[0].clone();
+    free[1..].iter().for_each(|more| together.append(more));
+    let pairs = free.iter().enumerate().flat_map(|(k, a)| free[..k].iter().map(move |b| (a, b)));
+    let apart = |(a, b): (&Samples, &Samples)| {
+        kolmogorov_smirnov(a.of(Quantity::Speed), b.of(Quantity::Speed)).unwrap_or(1.0)
+    };
+    let among: Vec<f64> = pairs.map(apart).collect();
     Ok(Verdict {
         bounded: both(&bounded),
         kept: kolmogorov_smirnov(&kept, one.samples.of(Quantity::Speed)).unwrap_or(1.0),
-        free: free.iter().map(both).collect(),
+        free: both(&together),
+        alone: free.iter().map(|s| one.distance(s, Quantity::Speed)).collect(),
+        among: among.iter().sum::<f64>() / among.len() as f64,
         others: (!others.is_empty()).then(|| others.iter().sum::<f64>() / others.len() as f64),
         lane_changes_1_km: [
             one.samples.lane_changes_1_km(),
@@ -108,7 +121,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let (generations, parts): (usize, usize) = (generations.parse()?, parts.parse()?);
     let all = files.iter().map(|f| Looked::at(f)).collect::<Result<Vec<_>, _>>()?;
-    let (mut bounded_met, mut free_met, mut sums) = (0, 0, [0.0; 4]);
+    let (mut bounded_met, mut free_met, mut sums) = (0, 0, [0.0; 6]);
     for part in 0..parts {
         let is_out = |k: usize| k % parts == part;
         let learned = all.iter().enumerate().filter(|(k, _)| parts == 1 || !is_out(*k));
@@ -122,40 +135,45 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         for (_, one) in all.iter().enumerate().filter(|(k, _)| is_out(*k)) {
             let v = judge(one, &all, &found)?;
-            let free = |q: usize| v.free.iter().map(|f| f[q]).sum::<f64>() / v.free.len() as f64;
-            let least = v.free.iter().map(|f| f[0]).fold(f64::INFINITY, f64::min);
-            let most = v.free.iter().map(|f| f[0]).fold(0.0, f64::max);
+            let alone = v.alone.iter().sum::<f64>() / v.alone.len() as f64;
+            let least = v.alone.iter().copied().fold(f64::INFINITY, f64::min);
+            let most = v.alone.iter().copied().fold(0.0, f64::max);
             println!(
-                "{}: bounded speed {:.3} gap {:.3}, kept {:.3}, free speed {:.3} ({least:.3} to \
-                 {most:.3}) gap {:.3}, others {:.3}; lane changes per km {:.2} measured, {:.2} \
+                "{}: bounded speed {:.3} gap {:.3}, kept {:.3}, free speed {:.3} gap {:.3}, \
+                 alone {alone:.3} ({least:.3} to {most:.3}), among {:.3}, others {:.3}; lane changes per km {:.2} measured, {:.2} \
                  bounded, {:.2} free",
                 one.name,
                 v.bounded[0],
                 v.bounded[1],
                 v.kept,
-                free(0),
-                free(1),
+                v.free[0],
+                v.free[1],
+                v.among,
                 v.others.unwrap_or(f64::NAN),
                 v.lane_changes_1_km[0],
                 v.lane_changes_1_km[1],
                 v.lane_changes_1_km[2],
             );
             bounded_met += usize::from(v.bounded[0] <= 0.15);
-            free_met += usize::from(free(0) <= 0.15);
+            free_met += usize::from(v.free[0] <= 0.15);
             let others = v.others.unwrap_or(0.0);
-            for (sum, x) in sums.iter_mut().zip([v.bounded[0], v.kept, free(0), others]) {
+            for (sum, x) in
+                sums.iter_mut().zip([v.bounded[0], v.kept, v.free[0], alone, v.among, others])
+            {
                 *sum += x / all.len() as f64;
             }
         }
     }
     println!(
         "within 0.15: bounded {bounded_met}, free {free_met} of {}; means: bounded {:.3}, kept \
-         {:.3}, free {:.3}, others {:.3}",
+         {:.3}, free {:.3}, alone {:.3}, among {:.3}, others {:.3}",
         all.len(),
         sums[0],
         sums[1],
         sums[2],
         sums[3],
+        sums[4],
+        sums[5],
     );
     Ok(())
 }

@@ -208,7 +208,9 @@ impl<'a> Judge<'a> {
         Ok(Self { each, changes_1_km, trial_s, seed: base.seed })
     }
 
-    /// How far free traffic is from its recording, mean of them.
+    /// How far free traffic is from its recording, mean of them: all drives together, since those
+    /// of half a minute differ from each other as much as from a recording, and drivers who are
+    /// judged by single ones become all alike.
     fn free(
         &self,
         base: &TrafficConfig,
@@ -219,12 +221,14 @@ impl<'a> Judge<'a> {
         for m in &self.each {
             let measured = with_measured_demand(base, &m.lesson, &m.boundary);
             let config = with_free(&measured, population, values);
+            let mut all = Samples::default();
             for k in 0..FREE_DRIVES {
                 let config = TrafficConfig { seed: self.seed.wrapping_add(k), ..config.clone() };
-                let mut samples = drive(m.lesson.road, config, self.trial_s)?;
-                samples.sort();
-                sum += m.weight * distance(&samples, &m.samples) / FREE_DRIVES as f64;
+                let samples = drive(m.lesson.road, config, self.trial_s)?;
+                if k == 0 { all = samples } else { all.append(&samples) }
             }
+            all.sort();
+            sum += m.weight * distance(&all, &m.samples);
         }
         Ok(sum)
     }
@@ -336,6 +340,38 @@ mod tests {
         assert!(same.vehicles.abs_diff(2 * measured.vehicles) < measured.vehicles / 5);
         let (same, timid) = (speed(&same), speed(&timid));
         assert!(same < 0.25 && timid > 2.0 * same, "{same}, {timid} with timid drivers");
+    }
+
+    #[test]
+    fn free_traffic_is_judged_by_all_its_drives_together() {
+        // The story: half a minute of free traffic is as far from half a minute of the same traffic
+        // with another seed as from the recording. Judged one by one, those drivers won who made all
+        // drives alike, smoother than any recording, and no recording came within 0.15.
+        let road = Arc::new(builtin::flat(700.0));
+        let truth = TrafficConfig {
+            max_speed_m_s: 20.0,
+            outflow_speed_m_s: Some(6.0),
+            outflow_sigma_m_s: 2.0,
+            spawn_probability: 0.04,
+            seed: 9,
+            ..TrafficConfig::default()
+        };
+        let recording = recorded(&road, truth, 30.0);
+        let samples = observe_recording(&road, &recording).unwrap();
+        let lesson = Lesson { recording: &recording, road: &road, samples: &samples };
+        let base = TrafficConfig { seed: 40, ..TrafficConfig::default() };
+        let judge = Judge::of(&[lesson], &base, 30.0).unwrap();
+        let (people, values) = (usual(&POPULATION), usual(&FREE));
+        let together = judge.free(&base, &people, &values).unwrap();
+        let boundary = Boundary::of(&road, &recording).unwrap();
+        let config = with_free(&with_measured_demand(&base, &lesson, &boundary), &people, &values);
+        let alone = |k| {
+            let config = TrafficConfig { seed: base.seed + k, ..config.clone() };
+            distance(&drive(&road, config, 30.0).unwrap(), &judge.each[0].samples)
+        };
+        let alone = (0..FREE_DRIVES).map(alone).sum::<f64>() / FREE_DRIVES as f64;
+        // The distance of a mixture is never more than the mean of the distances.
+        assert!(together < alone - 1e-4, "{together} together, {alone} one by one");
     }
 
     #[test]
