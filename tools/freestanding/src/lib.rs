@@ -14,7 +14,7 @@ mod error;
 mod guard;
 
 use error::PlannerError;
-use guard::{GuardConfig, GuardInput, GuardMemory};
+use guard::{GuardConfig, GuardInput, GuardMemory, Inputs};
 
 use core::hint::black_box;
 
@@ -210,6 +210,7 @@ pub struct Tick {
     ego: Option<Stamped<EgoState>>,
     status: VehicleStatus,
     scene_time: Option<Time>,
+    demand_time: Option<Time>,
     input: GuardInput,
     limits: VehicleLimits,
 }
@@ -217,7 +218,9 @@ pub struct Tick {
 /// A tick of the guard.
 #[unsafe(no_mangle)]
 pub extern "C" fn guard_tick(tick: &Tick) {
-    let Tick { config, memory, now, ego, status, scene_time, input, limits } = tick;
-    black_box(guard::inspect(config, memory, *now, ego.as_ref(), status, *scene_time));
+    let Tick { config, memory, now, ego, status, scene_time, demand_time, input, limits } = tick;
+    let (scene_time, demand_time) = (*scene_time, *demand_time);
+    let inputs = Inputs { ego: ego.as_ref(), status, scene_time, demand_time };
+    black_box(guard::inspect(config, memory, *now, &inputs));
     black_box(guard::limit(config, memory, input, limits));
 }

@@ -1,6 +1,6 @@
 //! The guard alone: what it says of a tick in order and of wrong ones, and what it then asks for.
 
-use crate::guard::{GuardConfig, GuardInput, GuardMemory, inspect, limit};
+use crate::guard::{self, GuardConfig, GuardInput, GuardMemory, inspect, limit};
 use crate::meter::Meter;
 use tractrix_core::{
     Command, EgoState, GuardReason, Stamped, Time, VehicleFault, VehicleLimits, VehicleStatus,
@@ -12,15 +12,17 @@ struct Inputs {
     ego: Option<Stamped<EgoState>>,
     status: VehicleStatus,
     scene_time: Option<Time>,
+    demand_time: Option<Time>,
     pedal_frac: f64,
 }
 
 /// One thing that goes wrong, and what the guard calls it.
 type Case = (fn(&mut Inputs), GuardReason);
 
-const CASES: [Case; 8] = [
+const CASES: [Case; 9] = [
     (|i| i.ego = None, GuardReason::Stale),
     (|i| i.scene_time = None, GuardReason::Stale),
+    (|i| i.demand_time = Some(Time(-1_000_000_000)), GuardReason::Stale),
     (|i| ego(i).time = Time(-1_000_000_000), GuardReason::Stale),
     (|i| ego(i).value.speed_m_s = f64::NAN, GuardReason::NonFinite),
     (|i| ego(i).value.s_m += 50.0, GuardReason::Jump),
@@ -41,8 +43,13 @@ pub fn all_cases(meter: &Meter, limits: &VehicleLimits) -> Result<(usize, u64), 
     let mut tick = |inputs: &Inputs, memory: &GuardMemory| {
         let (instructions, result) = meter.instructions(|| {
             let ego = inputs.ego.as_ref();
-            let (inspection, memory) =
-                inspect(&config, memory, inputs.now, ego, &inputs.status, inputs.scene_time);
+            let read = guard::Inputs {
+                ego,
+                status: &inputs.status,
+                scene_time: inputs.scene_time,
+                demand_time: inputs.demand_time,
+            };
+            let (inspection, memory) = inspect(&config, memory, inputs.now, &read);
             let input = GuardInput {
                 dt_s: 0.01,
                 speed_m_s: 20.0,
@@ -70,6 +77,7 @@ pub fn all_cases(meter: &Meter, limits: &VehicleLimits) -> Result<(usize, u64), 
             ego: Some(Stamped { time: now, value }),
             status: VehicleStatus::default(),
             scene_time: Some(now),
+            demand_time: None,
             pedal_frac: 0.5,
         }
     };
