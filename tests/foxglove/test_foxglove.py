@@ -162,7 +162,9 @@ def test_a_published_command_acts_and_a_wrong_one_is_refused_with_words(
             viewer.until(lambda: len(viewer.statuses) >= 2)
             assert "/command/fly commands nothing" in viewer.statuses[1]
             viewer.publish(4, "/command/lane_change", "left")
-            viewer.until(lambda: "--decider external" in viewer.statuses[-1])
+            viewer.until(
+                lambda: "set_decider can make it external" in viewer.statuses[-1]
+            )
             viewer.call("/step", ticks=20)
         run.end()
     with (tmp_path / "out" / "run.mcap").open("rb") as file:
