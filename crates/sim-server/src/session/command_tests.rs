@@ -114,3 +114,15 @@ fn what_is_no_command_is_refused_with_a_code_and_in_our_own_words() {
         assert!(error.to_string().contains(words), "{text}: {error}");
     }
 }
+
+/// The words stand in the refusal and on the page too.
+#[test]
+fn every_fault_is_named_where_it_can_be_chosen() {
+    let refusal = read(r#"{"action":"fault","fault":"wings","on":true}"#).err().unwrap();
+    let (refusal, page) = (refusal.to_string(), include_str!("../dashboard/page/index.html"));
+    for fault in Fault::ALL {
+        let word = fault.word();
+        assert!(refusal.contains(word), "{refusal}");
+        assert!(page.contains(&format!("<option value=\"{word}\">")), "{word} is not on the page");
+    }
+}
