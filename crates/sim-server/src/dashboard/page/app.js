@@ -35,13 +35,18 @@ const ahead = new Ahead($("ahead"), road);
 const map = new MiniMap($("map"), road);
 const strips = new Strips($("strips"), road);
 const values = new Values($("values"), $("vehicle"), view);
-let frame = null;
+let frame = null, leaving = false;
 startControls(view, () => frame);
 
 // -- telemetry -----------------------------------------------------------------------------------
 function take(now) {
   // Another run has taken the port: its road, limits and plots are other ones.
-  if (frame && frame.run_id !== now.run_id) return location.reload();
+  // Once: a second reload would break off the first.
+  if (leaving) return;
+  if (frame && frame.run_id !== now.run_id) {
+    leaving = true;
+    return location.reload();
+  }
   frame = now;
   view.push(frame);
   ahead.push(frame);
