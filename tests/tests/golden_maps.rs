@@ -96,3 +96,36 @@ fn density_over_decider() {
     text.push('\n');
     compare("density_decider.txt", &text);
 }
+
+/// What the predictive planner saves against the ghost on the main job's road without traffic.
+#[test]
+fn truck_and_mass_over_what_is_saved_against_the_ghost() {
+    let mut text = String::from(
+        "truck     | payload, t | fuel, g | time, s | ghost: fuel, g | time, s | a second, g | saved, %",
+    );
+    for truck in ["longhaul", "sinotruk"] {
+        for payload_kg in [36_000.0, 21_000.0] {
+            let mut s = Scenario::builtin("highway-empty").unwrap();
+            s.truck.file = truck.into();
+            s.truck.payload_kg = payload_kg;
+            let mut world = World::new(&s, 1).unwrap();
+            world.attach_ghost().unwrap();
+            world.run(&mut ()).unwrap();
+            let ghost = world.ghost().unwrap();
+            write!(
+                text,
+                "\n{truck:9} | {:10.0} | {:7.0} | {:7.1} | {:14.0} | {:7.1} | {:11.1} | {:8.1}",
+                1e-3 * payload_kg,
+                ghost.ego_fuel_g,
+                ghost.ego_time_s,
+                ghost.fuel_g,
+                ghost.time_s,
+                ghost.price_of_time_g_s.unwrap(),
+                100.0 * ghost.saving_frac.unwrap()
+            )
+            .unwrap();
+        }
+    }
+    text.push('\n');
+    compare("against_the_ghost.txt", &text);
+}

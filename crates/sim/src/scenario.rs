@@ -127,7 +127,7 @@ impl Default for Weather {
     }
 }
 
-/// Tick and end of a run.
+/// Tick, end and seed of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunLimits {
@@ -140,11 +140,13 @@ pub struct RunLimits {
     /// A ghost under ordinary cruise control drives along, where the shell shows one
     /// ([`crate::World::attach_ghost`]).
     pub ghost: bool,
+    /// Seed of a run that is given none.
+    pub seed: u64,
 }
 
 impl Default for RunLimits {
     fn default() -> Self {
-        Self { tick_s: 0.01, duration_s: 3600.0, allow_off_road: false, ghost: true }
+        Self { tick_s: 0.01, duration_s: 3600.0, allow_off_road: false, ghost: true, seed: 1 }
     }
 }
 
@@ -231,7 +233,8 @@ impl Scenario {
         if wrong.is_empty() { Ok(()) } else { Err(wrong.join("; ")) }
     }
 
-    /// The seed of a run: the one given, else the one of the manifest that is repeated, else 1.
+    /// The seed of a run: the one given, else the one of the manifest that is repeated, else the
+    /// scenario's own.
     ///
     /// # Errors
     /// As [`crate::read_manifest`].
@@ -239,7 +242,7 @@ impl Scenario {
         match (given, &self.traffic.manifest) {
             (Some(seed), _) => Ok(seed),
             (None, Some(file)) => crate::read_manifest(file.as_ref()).map(|m| m.seed),
-            (None, None) => Ok(1),
+            (None, None) => Ok(self.run.seed),
         }
     }
 

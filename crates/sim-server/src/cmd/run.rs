@@ -63,7 +63,7 @@ pub(crate) struct Args {
     /// realtime, max, or simulated seconds per second [default: realtime, max with --headless].
     #[arg(long)]
     pace: Option<Pace>,
-    /// Seed of everything that is drawn at random [default: 1, or the manifest's].
+    /// Seed of everything that is drawn at random [default: the manifest's or the scenario's, else 1].
     #[arg(long)]
     seed: Option<u64>,
     /// Folder of run.mcap and summary.json [default: a new one under runs/].

@@ -72,7 +72,7 @@ pub(crate) struct Args {
     /// Draws flow over density for the native engine and, where it is installed, SUMO.
     #[arg(long)]
     diagram: bool,
-    /// Seed of everything that is drawn at random [default: 1, or the manifest's].
+    /// Seed of everything that is drawn at random [default: the manifest's or the scenario's, else 1].
     #[arg(long)]
     seed: Option<u64>,
     /// Prints statistics.json on stdout instead of a sentence.
