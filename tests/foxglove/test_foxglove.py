@@ -9,6 +9,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ from mcap_ros2.decoder import DecoderFactory
 from viewer import Said, connected
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
-from websockets.typing import Subprotocol
+from websockets.typing import Origin, Subprotocol
 
 SERVER = os.environ["SIM_SERVER"]
 
@@ -182,6 +183,49 @@ def test_a_viewer_of_the_old_protocol_is_refused_in_the_log(tmp_path: Path) -> N
                 pass
         said = run.end()
     assert "a viewer must offer foxglove.sdk.v1" in said
+
+
+def test_pages_of_other_sites_and_foreign_names_are_refused(tmp_path: Path) -> None:
+    with running(tmp_path / "out", "--foxglove-origin", "file://") as run:
+        new = [Subprotocol("foxglove.sdk.v1")]
+        port = run.url.rsplit(":", 1)[1]
+        own = ("http://localhost:8080", "https://app.foxglove.dev", "file://")
+        for origin in own:
+            with connect(run.url, subprotocols=new, origin=Origin(origin)) as viewer:
+                assert json.loads(viewer.recv(timeout=10))["op"] == "serverInfo", origin
+        for origin in ("null", "http://evil.example", "https://localhost.evil.example"):
+            with pytest.raises(InvalidStatus) as refused:
+                connect(run.url, subprotocols=new, origin=Origin(origin))
+            assert refused.value.response.status_code == 403, origin
+            assert origin in refused.value.response.body.decode()
+        # A foreign name that leads here (DNS rebinding)
+        with (
+            socket.create_connection(("127.0.0.1", int(port)), timeout=10) as raw,
+            pytest.raises(InvalidStatus) as refused,
+        ):
+            connect(f"ws://evil.example:{port}", subprotocols=new, sock=raw)
+        assert refused.value.response.status_code == 403
+        said = run.end()
+    assert "refused a viewer: origin" in said
+
+
+def test_who_only_opens_connections_keeps_no_viewer_out_for_long(
+    tmp_path: Path,
+) -> None:
+    with running(tmp_path / "out", "--pace", "1") as run:
+        address = ("127.0.0.1", int(run.url.rsplit(":", 1)[1]))
+        idle = [socket.create_connection(address, timeout=20) for _ in range(16)]
+        with socket.create_connection(address, timeout=10) as late:
+            assert late.recv(1000).startswith(b"HTTP/1.1 503 ")
+        for silent in idle:
+            assert silent.recv(1000).startswith(b"HTTP/1.1 408 ")
+            silent.close()
+        with connected(run.url) as viewer:
+            assert viewer.call("/pause")["state"] == "paused"
+        with socket.create_connection(address, timeout=10) as long:
+            long.sendall(b"GET / HTTP/1.1\r\n" + b"x: y\r\n" * 2000)
+            assert long.recv(1000).startswith(b"HTTP/1.1 431 ")
+        run.end()
 
 
 def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:

@@ -178,7 +178,7 @@ fn campaign_against_dynamic_programming_eco_roll() {
 }
 
 #[test]
-#[ignore = "campaign: cargo test --release -p planner --test pcc_reference -- --ignored --nocapture not_tuned"]
+#[ignore = "campaign: cargo test --release -p planner --test pcc_reference -- --ignored --nocapture nobody"]
 fn campaign_on_roads_that_nobody_has_tuned_to_only_reports() {
     let roads = corpus::unseen();
     for engine in [Engine::Longhaul, Engine::Measured] {

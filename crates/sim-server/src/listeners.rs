@@ -16,7 +16,7 @@ pub(crate) struct Listeners {
 }
 
 /// What is asked for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Wanted {
     /// A node of a ROS 2 domain.
     pub(crate) ros2: bool,
@@ -25,6 +25,9 @@ pub(crate) struct Wanted {
     pub(crate) with_autoware: bool,
     /// A server of Foxglove's protocol, on this port.
     pub(crate) foxglove: Option<u16>,
+    /// Origins of pages that it shows the run to, beside those of this computer and Foxglove's own.
+    #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "the server's alone"))]
+    pub(crate) foxglove_origins: Vec<String>,
 }
 
 impl Wanted {
@@ -32,7 +35,7 @@ impl Wanted {
     ///
     /// # Errors
     /// [`Failure::Input`] says how to build it.
-    pub(crate) fn refuse_unbuilt(self) -> Result<(), Failure> {
+    pub(crate) fn refuse_unbuilt(&self) -> Result<(), Failure> {
         let ros2 = self.ros2 && cfg!(not(feature = "ros2"));
         let foxglove = self.foxglove.is_some() && cfg!(not(feature = "foxglove"));
         match (ros2, foxglove) {
@@ -66,7 +69,10 @@ impl Listeners {
             #[cfg(feature = "foxglove")]
             foxglove: wanted
                 .foxglove
-                .map(|port| crate::foxglove_live::Live::start(port, session, runtime))
+                .map(|port| {
+                    let pages = wanted.foxglove_origins;
+                    crate::foxglove_live::Live::start(port, pages, session, runtime)
+                })
                 .transpose()?,
         })
     }

@@ -95,10 +95,14 @@ pub(crate) struct Args {
     #[arg(long, value_name = "NAMES", requires = "ros2", hide_possible_values = true)]
     ros2_names: Option<Names>,
     /// Shows the run to Foxglove and Lichtblick, and takes commands from them, on this port of
-    /// 127.0.0.1 (0: a free one). Nobody is authenticated, and any page in a browser on this
-    /// machine can reach it. Needs a program that is built with `--features foxglove`.
+    /// 127.0.0.1 (0: a free one). No program is authenticated; of pages in a browser those of this
+    /// machine and of app.foxglove.dev are let in. Needs a program that is built with
+    /// `--features foxglove`.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     foxglove: Option<u16>,
+    /// Another page that may show the run, by its origin (https://viewer.example, file://).
+    #[arg(long, value_name = "ORIGIN", requires = "foxglove", value_parser = origin)]
+    foxglove_origin: Vec<String>,
 }
 
 /// Whose names the ROS 2 node has.
@@ -114,6 +118,14 @@ fn vehicle(text: &str) -> Result<String, String> {
         None if ["direct", "bus"].contains(&text) => Ok(text.to_owned()),
         Some(("can" | "socketcand", _)) => Ok(text.to_owned()),
         _ => Err("direct, bus, can:IFACE or socketcand:HOST:PORT/IFACE".to_owned()),
+    }
+}
+
+/// The origin of a page, as a browser sends it: not `null`, which any page can be.
+fn origin(text: &str) -> Result<String, String> {
+    match text.split_once("://") {
+        Some((scheme, host)) if !scheme.is_empty() && !host.contains('/') => Ok(text.to_owned()),
+        _ => Err("SCHEME://HOST or SCHEME://HOST:PORT, without a path".to_owned()),
     }
 }
 

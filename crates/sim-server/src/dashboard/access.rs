@@ -70,6 +70,25 @@ fn read_token(path: &Path) -> Result<String, Failure> {
     Ok(token.to_owned())
 }
 
+/// Whether a `Host`, with a port or without, is a name of this computer.
+pub(crate) fn is_this_computer(host: &str) -> bool {
+    matches!(without_port(host), "127.0.0.1" | "localhost" | "[::1]")
+}
+
+fn without_port(host: &str) -> &str {
+    match host.rsplit_once(':') {
+        Some((name, port)) if port.parse::<u16>().is_ok() => name,
+        _ => host,
+    }
+}
+
+fn is_address(name: &str) -> bool {
+    match name.strip_prefix('[').and_then(|name| name.strip_suffix(']')) {
+        Some(v6) => v6.parse::<std::net::Ipv6Addr>().is_ok(),
+        None => name.parse::<Ipv4Addr>().is_ok(),
+    }
+}
+
 impl Access {
     /// This computer, without a token.
     #[cfg(test)]
@@ -80,17 +99,7 @@ impl Access {
     /// Whether this name of a host may be asked for: a name of this computer, or, where others may
     /// ask, an address. A foreign name that leads here is not served (DNS rebinding).
     pub(super) fn serves(&self, host: &str) -> bool {
-        let name = match host.rsplit_once(':') {
-            Some((name, port)) if port.parse::<u16>().is_ok() => name,
-            _ => host,
-        };
-        let address = name.strip_prefix('[').and_then(|name| name.strip_suffix(']'));
-        let is_address = match address {
-            Some(v6) => v6.parse::<std::net::Ipv6Addr>().is_ok(),
-            None => name.parse::<Ipv4Addr>().is_ok(),
-        };
-        matches!(name, "127.0.0.1" | "localhost" | "[::1]")
-            || (is_address && !self.bind.is_loopback())
+        is_this_computer(host) || (is_address(without_port(host)) && !self.bind.is_loopback())
     }
 
     /// Whether a request carries the token, if there is one.

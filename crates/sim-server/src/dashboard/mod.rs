@@ -39,6 +39,8 @@ use tokio::sync::watch;
 
 pub(crate) use access::AccessArgs;
 #[cfg(feature = "foxglove")]
+pub(crate) use access::is_this_computer;
+#[cfg(feature = "foxglove")]
 pub(crate) use api::carry_out;
 pub(crate) use hub::Hub;
 pub(crate) use metrics::Metrics;

@@ -4,8 +4,10 @@
 
 mod channels;
 mod commands;
+mod gate;
 mod refusals;
 
+use std::net::Ipv4Addr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -36,16 +38,28 @@ pub(crate) struct Live {
 }
 
 impl Live {
-    /// Starts to serve a session on 127.0.0.1; port 0 takes a free one.
+    /// Starts to serve a session on 127.0.0.1; port 0 takes a free one. Pages of these origins may
+    /// show it, beside those of this computer and Foxglove's own.
     ///
     /// # Errors
     /// [`Failure::Input`]: the port is taken.
     pub(crate) fn start(
         port: u16,
+        pages: Vec<String>,
         session: &Handle,
         runtime: &runtime::Handle,
     ) -> Result<Self, Failure> {
         refusals::log();
+        let taken = |e: std::io::Error| match e.kind() {
+            std::io::ErrorKind::AddrInUse => {
+                Failure::Input(format!("--foxglove: port {port} on 127.0.0.1 is in use"))
+            }
+            _ => Failure::Input(format!("--foxglove {port}: {e}")),
+        };
+        let door = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(taken)?;
+        door.set_nonblocking(true).map_err(taken)?;
+        let address = door.local_addr().map_err(taken)?;
+        let hidden = gate::hidden();
         let context = Context::new();
         let channels = Arc::new(Channels::open(&context)?);
         let commands = Commands::new(session.clone(), Arc::clone(&channels), runtime.clone());
@@ -53,20 +67,19 @@ impl Live {
             .name("tractrix")
             .context(&context)
             .tokio_runtime(runtime)
-            .bind("127.0.0.1", port)
+            .bind(hidden.to_string(), 0)
             .capabilities([Capability::Time, Capability::ClientPublish])
             .supported_encodings(["json"])
             .services(services(session))
             .listener(Arc::new(commands))
             .message_backlog_size(BACKLOG)
             .start_blocking()
-            .map_err(|e| match e {
-                FoxgloveError::Bind(e) if e.kind() == std::io::ErrorKind::AddrInUse => {
-                    Failure::Input(format!("--foxglove: port {port} on 127.0.0.1 is in use"))
-                }
-                e => Failure::Input(format!("--foxglove {port}: {e}")),
-            })?;
-        output::note(&format!("foxglove: ws://127.0.0.1:{}", server.port()));
+            .map_err(|e: FoxgloveError| Failure::Input(format!("--foxglove {port}: {e}")))?;
+        let entered = runtime.enter();
+        let door = tokio::net::TcpListener::from_std(door).map_err(taken)?;
+        drop(entered);
+        runtime.spawn(gate::keep(door, gate::inner(hidden, server.port()), pages));
+        output::note(&format!("foxglove: ws://{address}"));
         Ok(Self { server: Arc::new(server), channels, has_begun: AtomicBool::new(false) })
     }
 

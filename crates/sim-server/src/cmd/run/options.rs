@@ -31,7 +31,11 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
 }
 
 /// The networks that the run is to be shown on.
-pub(super) const fn networks(args: &Args) -> Wanted {
-    let with_autoware = matches!(args.ros2_names, Some(Names::Autoware));
-    Wanted { ros2: args.ros2, with_autoware, foxglove: args.foxglove }
+pub(super) fn networks(args: &Args) -> Wanted {
+    Wanted {
+        ros2: args.ros2,
+        with_autoware: matches!(args.ros2_names, Some(Names::Autoware)),
+        foxglove: args.foxglove,
+        foxglove_origins: args.foxglove_origin.clone(),
+    }
 }

@@ -1,0 +1,177 @@
+//! The door before the protocol's server, which looks at no header: a connection is passed on when
+//! its handshake asks for this computer, and comes from a program or from a page that may show runs.
+
+use std::collections::hash_map::RandomState;
+use std::hash::BuildHasher;
+use std::io;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio::time::timeout;
+
+use crate::dashboard::is_this_computer;
+
+/// Viewers at a time, those in the handshake included.
+const MOST: usize = 16;
+/// Longest head of a handshake, bytes.
+const MAX_HEAD: usize = 8192;
+/// Most headers of one.
+const MAX_HEADERS: usize = 64;
+/// A head is there after this time.
+const HANDSHAKE: Duration = Duration::from_secs(5);
+/// After an error of the listener, so that one that lasts takes no processor time.
+const PAUSE: Duration = Duration::from_millis(100);
+/// The page of Foxglove itself.
+const FOXGLOVE: &str = "https://app.foxglove.dev";
+
+/// Where the protocol's own server listens: an address of this computer that a page would have to
+/// guess, because whoever reaches it passes the door by.
+pub(super) fn hidden() -> Ipv4Addr {
+    if !cfg!(target_os = "linux") {
+        // Elsewhere 127.0.0.1 is the only address of the loopback interface.
+        return Ipv4Addr::LOCALHOST;
+    }
+    let [a, b, c, ..] = RandomState::new().hash_one(0_u8).to_le_bytes();
+    Ipv4Addr::new(127, a.max(1), b, c.clamp(1, 254))
+}
+
+/// Lets viewers in from `listener` to the server at `inner`, until the runtime ends. `pages` are
+/// origins beside those of this computer and of Foxglove.
+pub(super) async fn keep(listener: TcpListener, inner: SocketAddr, pages: Vec<String>) {
+    let pages = Arc::new(pages);
+    let places = Arc::new(Semaphore::new(MOST));
+    loop {
+        let Ok((mut viewer, _)) = listener.accept().await else {
+            tokio::time::sleep(PAUSE).await;
+            continue;
+        };
+        let Ok(place) = Arc::clone(&places).try_acquire_owned() else {
+            let _ = refuse(&mut viewer, "503 Service Unavailable", "too many viewers").await;
+            continue;
+        };
+        let pages = Arc::clone(&pages);
+        tokio::spawn(async move {
+            // Whoever hangs up ends his own connection only.
+            let _ = let_in(viewer, inner, &pages).await;
+            drop(place);
+        });
+    }
+}
+
+async fn let_in(mut viewer: TcpStream, inner: SocketAddr, pages: &[String]) -> io::Result<()> {
+    let head = match timeout(HANDSHAKE, head(&mut viewer)).await {
+        Ok(Ok(Some(head))) => head,
+        Ok(Err(e)) => return Err(e),
+        Ok(Ok(None)) => {
+            return refuse(&mut viewer, "431 Request Header Fields Too Large", "too long").await;
+        }
+        Err(_) => return refuse(&mut viewer, "408 Request Timeout", "no handshake").await,
+    };
+    if let Err(why) = may_enter(&head, pages) {
+        log::error!(target: "foxglove", "refused a viewer: {why}");
+        return refuse(&mut viewer, "403 Forbidden", &why).await;
+    }
+    let mut server = TcpStream::connect(inner).await?;
+    server.set_nodelay(true)?;
+    viewer.set_nodelay(true)?;
+    server.write_all(&head).await?;
+    tokio::io::copy_bidirectional(&mut viewer, &mut server).await?;
+    Ok(())
+}
+
+/// What was read up to the end of a request's head; none when it is too long.
+async fn head(viewer: &mut TcpStream) -> io::Result<Option<Vec<u8>>> {
+    let mut read = Vec::with_capacity(1024);
+    loop {
+        if viewer.read_buf(&mut read).await? == 0 {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        if read.windows(4).any(|end| end == b"\r\n\r\n") {
+            return Ok(Some(read));
+        }
+        if read.len() >= MAX_HEAD {
+            return Ok(None);
+        }
+    }
+}
+
+/// Whether a handshake names this computer, and comes from a program or a page that may show runs.
+fn may_enter(head: &[u8], pages: &[String]) -> Result<(), String> {
+    let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
+    let mut request = httparse::Request::new(&mut headers);
+    request.parse(head).map_err(|e| format!("the handshake is no HTTP request: {e}"))?;
+    let values = |name: &str| -> Vec<&[u8]> {
+        let named = request.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name));
+        named.map(|h| h.value).collect()
+    };
+    let said =
+        |value: &[u8]| -> String { String::from_utf8_lossy(value).chars().take(80).collect() };
+    match values("host")[..] {
+        [host] if is_this_computer(&said(host)) => {}
+        _ => return Err("its Host is not this computer".to_owned()),
+    }
+    match values("origin")[..] {
+        [] => Ok(()),
+        [origin] if may_show(&said(origin), pages) => Ok(()),
+        [origin, ..] => {
+            let origin = said(origin);
+            Err(format!("origin {origin:?} (--foxglove-origin {origin} would let it in)"))
+        }
+    }
+}
+
+/// Pages of this computer, Foxglove's own, and those that were named.
+fn may_show(origin: &str, pages: &[String]) -> bool {
+    let local = origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"));
+    local.is_some_and(is_this_computer) || origin == FOXGLOVE || pages.iter().any(|p| p == origin)
+}
+
+async fn refuse(viewer: &mut TcpStream, status: &str, why: &str) -> io::Result<()> {
+    let length = why.len();
+    let answer = format!(
+        "HTTP/1.1 {status}\r\nContent-Type: text/plain; charset=utf-8\r\n\
+         Content-Length: {length}\r\nConnection: close\r\n\r\n{why}"
+    );
+    match timeout(HANDSHAKE, viewer.write_all(answer.as_bytes())).await {
+        Ok(written) => written,
+        Err(_) => Err(io::ErrorKind::TimedOut.into()),
+    }
+}
+
+/// The address of the protocol's own server.
+pub(super) fn inner(address: Ipv4Addr, port: u16) -> SocketAddr {
+    SocketAddr::new(IpAddr::V4(address), port)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn asks(headers: &[(&str, &str)]) -> Result<(), String> {
+        let lines: String = headers.iter().map(|(k, v)| format!("{k}: {v}\r\n")).collect();
+        may_enter(format!("GET / HTTP/1.1\r\n{lines}\r\n").as_bytes(), &["file://".to_owned()])
+    }
+
+    #[test]
+    fn programs_pages_of_this_computer_and_named_ones_enter() {
+        let host = ("Host", "127.0.0.1:8765");
+        assert!(asks(&[host]).is_ok(), "a program");
+        for origin in ["http://localhost:8080", "http://127.0.0.1", FOXGLOVE, "file://"] {
+            assert!(asks(&[host, ("Origin", origin)]).is_ok(), "{origin}");
+        }
+        for origin in ["null", "http://evil.example", "http://localhost.evil.example", ""] {
+            let refused = asks(&[host, ("ORIGIN", origin)]);
+            assert!(refused.unwrap_err().contains(origin), "{origin}");
+        }
+        // A foreign name that leads here, no name, two names or origins
+        for hosts in [&[("Host", "evil.example")][..], &[], &[host, host]] {
+            assert!(asks(hosts).is_err(), "{hosts:?}");
+        }
+        assert!(asks(&[host, ("Origin", FOXGLOVE), ("Origin", FOXGLOVE)]).is_err());
+        assert!(may_enter(b"\0\0\r\n\r\n", &[]).is_err());
+    }
+}
