@@ -40,7 +40,7 @@ def kinds(heard: list[tuple[float, Any]], kind: str) -> list[Any]:
 def test_a_viewer_is_greeted_chooses_its_channels_and_commands(
     server: Path, page: Page, tmp_path: Path
 ) -> None:
-    with running(server, tmp_path, "--decider", "external") as run:
+    with running(server, tmp_path, "--decider", "external", "--seed", "1") as run:
         page.goto(run.url)
         # On a busy machine the first plan takes its time
         page.wait_for_selector("#state:text-is('running')")
