@@ -25,7 +25,8 @@ class World:
     Args:
         scenario: Name of a built-in scenario (`tractrix.scenarios()`), a scenario file (`.toml`), or
             what `tractrix.scenario()` returned, changed.
-        seed: Seed of everything that is drawn at random. Default: the manifest's or the scenario's, else 1.
+        seed: Seed of everything that is drawn at random. Default: the manifest's or the
+            scenario's, else 1.
         road: Another road: `.xodr`, `.csv`, `builtin:highway`, `builtin:highway-sag`,
             `builtin:test-site`, `builtin:flat`.
         truck: Another truck: a truck file or a built-in name.

@@ -197,7 +197,10 @@ def test_pages_of_other_sites_and_foreign_names_are_refused(tmp_path: Path) -> N
             with pytest.raises(InvalidStatus) as refused:
                 connect(run.url, subprotocols=new, origin=Origin(origin))
             assert refused.value.response.status_code == 403, origin
-            assert origin in refused.value.response.body.decode()
+            words = refused.value.response.body.decode()
+            assert origin in words and ("--foxglove-origin" in words) == (
+                origin != "null"
+            )
         # A foreign name that leads here (DNS rebinding)
         with (
             socket.create_connection(("127.0.0.1", int(port)), timeout=10) as raw,
@@ -205,6 +208,12 @@ def test_pages_of_other_sites_and_foreign_names_are_refused(tmp_path: Path) -> N
         ):
             connect(f"ws://evil.example:{port}", subprotocols=new, sock=raw)
         assert refused.value.response.status_code == 403
+        # No name, two names, two origins, and what is no request
+        one, page = "Host: localhost\r\n", "Origin: http://localhost\r\n"
+        for lines in ("", one * 2, one + page * 2, "\0: \0\r\n"):
+            with socket.create_connection(("127.0.0.1", int(port)), timeout=10) as raw:
+                raw.sendall(f"GET / HTTP/1.1\r\n{lines}\r\n".encode())
+                assert raw.recv(1000).startswith(b"HTTP/1.1 403 "), lines
         said = run.end()
     assert "refused a viewer: origin" in said
 

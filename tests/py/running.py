@@ -6,6 +6,7 @@ import json
 import re
 import signal
 import subprocess
+import time
 import urllib.request
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -62,3 +63,15 @@ def started(*command: str | Path) -> Iterator[Run]:
             yield Run(process, address.group())
         finally:
             process.kill()
+
+
+def settled_time_s(run: Run) -> float:
+    """Time of a paused run, s: telemetry trails the run by a frame, so ask until it stays."""
+    last = -1.0
+    for _ in range(100):
+        now = float(run.get("/api/v1/state")["time_s"])
+        if now == last:
+            return now
+        last = now
+        time.sleep(0.2)
+    raise AssertionError(f"the run does not stay paused: {last} s")

@@ -6,7 +6,8 @@
 //! | `config` | what a user may set |
 //! | `settings` | what may be set while it drives |
 //! | `outside` | demands of who drives in its place |
-//! | `tactics` | what to drive: lane changes, car following, reference speed |
+//! | `tactics` | what to drive: lane and lane changes, and the speed of `reference` |
+//! | `reference` | how fast: plans, jams, car following |
 //! | `decide` | the decision of a tick, and what a learned decider sees |
 //! | `speed` | the predictive speed planner in the stack |
 //! | `control` | how it is driven: both controllers and the gear |
@@ -17,6 +18,7 @@ mod control;
 mod decide;
 mod gear;
 mod outside;
+mod reference;
 mod settings;
 mod speed;
 mod tactics;

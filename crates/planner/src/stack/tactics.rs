@@ -3,22 +3,16 @@
 
 use alloc::sync::Arc;
 
-use super::speed::{Ahead, SpeedPlanning};
+use super::speed::SpeedPlanning;
 use super::{SpeedPlannerKind, StackConfig, grade};
 use crate::decider::observation::Observer;
 use crate::decider::{DeciderKind, LaneChoice, Policy, Scratch, lane_ends_in_m};
-use crate::pcc::horizon::{HorizonPoint, LeadAhead};
-use crate::safety::{Headway, RearResponse};
-use crate::speed::{
-    Following, Lead, LeadView, ReferenceSpeed, SpeedBounds, SpeedTarget, StopAndGo, follow, leads,
-    steady_gap_m,
-};
+use crate::safety::Headway;
+use crate::speed::{Following, LeadView, ReferenceSpeed, SpeedTarget, StopAndGo, leads};
 use crate::steering::{Lateral, LateralPath, ManeuverPlanner, Outlook};
 use crate::{PlannerError, Situation, SpeedProfile, wrapped};
 use road::{LaneKind, Road};
-use tractrix_core::{
-    EgoState, LaneChangeReason, LaneChangeRefusal, Maneuver, PlanStatus, SpeedPoint,
-};
+use tractrix_core::{EgoState, LaneChangeReason, LaneChangeRefusal, Maneuver, PlanStatus};
 
 /// Time for joining a lane's centre from beside it, s.
 const JOIN_S: f64 = 6.0;
@@ -75,8 +69,8 @@ pub struct Tactics {
     pub(super) policy: Option<Arc<Policy>>,
     pub(super) scratch: Scratch,
     pub(super) observer: Observer,
-    jam: StopAndGo,
-    ticks: u64,
+    pub(super) jam: StopAndGo,
+    pub(super) ticks: u64,
     /// The tick for which the reference speed was renewed last.
     foreseen: Option<u64>,
     /// The speed part of the last plan; the controllers may run less often than the loop.
@@ -335,28 +329,6 @@ impl Tactics {
         })
     }
 
-    /// Whether the speed is planned while driving.
-    pub(super) fn plans_ahead(&self) -> bool {
-        self.config.speed_planner == SpeedPlannerKind::Predictive && self.profile.is_none()
-    }
-
-    /// The plan at a station, where the speed is planned while driving.
-    pub(super) fn planned(&self, s_m: f64) -> Option<HorizonPoint> {
-        self.plans_ahead().then(|| self.speed.at(s_m)).flatten()
-    }
-
-    /// Takes note that traffic, not the plan, sets the acceleration.
-    pub(super) fn held_up(&mut self) {
-        if self.plans_ahead() {
-            self.speed.held_up();
-        }
-    }
-
-    /// The reference ahead.
-    pub(super) fn speed_points(&self) -> &[SpeedPoint] {
-        self.reference.points()
-    }
-
     /// Into the lane where the truck is; `None` if there is none to drive in.
     fn joining(&self, at: &Situation<'_>) -> Option<ManeuverPlanner> {
         let path = join_from(at.road, start_lane(at.road, at.ego)?, at.ego);
@@ -398,110 +370,9 @@ impl Tactics {
         Some(Outlook { at, reference_speed_m_s, grade_rad })
     }
 
-    /// The speed that the truck would drive without others, m/s. A plan begins at the speed that it
-    /// has, and may be made for staying behind somebody: the reference then wishes nothing.
-    pub(super) fn wish_speed_m_s(&self, s_m: f64, reference_m_s: f64) -> f64 {
-        let allowed = self.plans_ahead().then(|| self.ceiling.at(s_m)).flatten();
-        allowed.map_or(reference_m_s, |(m_s, _)| m_s.max(reference_m_s))
-    }
-
-    fn lead_view<'a>(&'a self, at: &Situation<'a>) -> LeadView<'a> {
+    pub(super) fn lead_view<'a>(&'a self, at: &Situation<'a>) -> LeadView<'a> {
         let Situation { ego, scene, road, limits, .. } = *at;
         LeadView { ego, scene, road, limits, rss: &self.config.rss }
-    }
-
-    /// Whether the truck may roll above the reference on descents.
-    fn may_overspeed(&self) -> bool {
-        self.config.speed_planner == SpeedPlannerKind::Cruise && self.config.overspeed_m_s > 0.0
-    }
-
-    /// Plans the speed of the next kilometres, if it is time to.
-    fn plan_speed(&mut self, at: &Situation<'_>, maneuver: &ManeuverPlanner) {
-        if !self.plans_ahead() {
-            return;
-        }
-        let Situation { now, ego, road, limits, .. } = *at;
-        let response = self.config.rss.ego_response(limits);
-        let lead = leads(&self.lead_view(at), maneuver)
-            .into_iter()
-            .flatten()
-            .filter(|lead| lead.in_path && !lead.being_left)
-            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
-            .map(|lead| LeadAhead {
-                id: lead.id,
-                gap_m: lead.gap_m,
-                speed_m_s: lead.speed_m_s,
-                wanted_gap_m: steady_gap_m(&self.config.following, &response, &lead),
-            });
-        let lead = lead.filter(|lead| {
-            self.config.decider == DeciderKind::KeepLane || self.speed.settled(ego, lead)
-        });
-        let ahead = Ahead { now, ego, road, lane: maneuver.path().lane, limits, lead };
-        self.speed.update(self.ticks, &self.config, &ahead);
-    }
-
-    fn update_reference(&mut self, at: &Situation<'_>, lane: u16) {
-        let bounds = SpeedBounds {
-            set_speed_m_s: self.config.set_speed_m_s,
-            obey_speed_limits: self.config.obey_speed_limits,
-            curve_accel_m_s2: self.config.curve_accel_m_s2,
-        };
-        let s_m = at.ego.s_m;
-        let profile = match self.config.speed_planner {
-            SpeedPlannerKind::Predictive => self.profile.as_ref(),
-            SpeedPlannerKind::Cruise => None,
-        };
-        let ahead = self.plans_ahead().then_some(&self.speed);
-        let planned = |s_m: f64| match ahead {
-            Some(speed) => speed.at(s_m).map(|p| p.speed_m_s),
-            None => profile.and_then(|p| p.at(s_m)),
-        };
-        self.reference.update(at.road, lane, s_m, &at.limits.geometry, &bounds, planned);
-        if self.may_overspeed() || self.plans_ahead() {
-            let over_m_s = if self.may_overspeed() { self.config.overspeed_m_s } else { 0.0 };
-            self.ceiling.update_like(&self.reference, bounds.set_speed_m_s + over_m_s);
-        }
-        self.speed_status = match (self.config.speed_planner, profile) {
-            (SpeedPlannerKind::Cruise, _) => PlanStatus::Cruise,
-            (SpeedPlannerKind::Predictive, None) => self.speed.status(s_m),
-            (SpeedPlannerKind::Predictive, Some(p)) if p.at(s_m).is_some() => p.status(),
-            (SpeedPlannerKind::Predictive, _) => PlanStatus::Fallback,
-        };
-    }
-
-    /// What a jam asks for, by the nearest vehicle in the path.
-    fn stop_and_go(
-        &mut self,
-        leads: &[Option<Lead>; 2],
-        response: &RearResponse,
-        speed_m_s: f64,
-    ) -> f64 {
-        let config = &self.config.following;
-        let lead = leads
-            .iter()
-            .flatten()
-            .filter(|lead| lead.in_path && !lead.being_left)
-            .min_by(|a, b| a.gap_m.total_cmp(&b.gap_m));
-        let steady_gap = |speed_m_s: f64| {
-            lead.map_or(0.0, |lead| steady_gap_m(config, response, &Lead { speed_m_s, ..*lead }))
-        };
-        self.jam.step(self.config.rates.control_s(), config, speed_m_s, lead, steady_gap)
-    }
-
-    /// The strictest request of car following, and whom it follows.
-    fn follow(
-        &self,
-        leads: &[Option<Lead>; 2],
-        response: &RearResponse,
-        speed_m_s: f64,
-        grade_rad: f64,
-    ) -> Option<(u64, Following)> {
-        let config = &self.config.following;
-        leads
-            .iter()
-            .flatten()
-            .map(|lead| (lead.id, follow(config, response, speed_m_s, grade_rad, lead)))
-            .min_by(|a, b| a.1.accel_m_s2.total_cmp(&b.1.accel_m_s2))
     }
 }
 

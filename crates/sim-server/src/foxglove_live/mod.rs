@@ -78,7 +78,7 @@ impl Live {
         let entered = runtime.enter();
         let door = tokio::net::TcpListener::from_std(door).map_err(taken)?;
         drop(entered);
-        runtime.spawn(gate::keep(door, gate::inner(hidden, server.port()), pages));
+        runtime.spawn(gate::keep(door, (hidden, server.port()).into(), pages));
         output::note(&format!("foxglove: ws://{address}"));
         Ok(Self { server: Arc::new(server), channels, has_begun: AtomicBool::new(false) })
     }

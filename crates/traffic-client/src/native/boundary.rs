@@ -10,8 +10,9 @@ use std::sync::Arc;
 use road::Road;
 use tractrix_core::{EgoState, Scene, Time, TrafficSource, VehicleClass};
 
+use super::accelerations::BEYOND_M;
 use super::driver::Driver;
-use super::engine::{BEYOND_M, Engine, TICK_S};
+use super::engine::{Engine, TICK_S};
 use super::fleet::Fleet;
 use crate::TrafficError;
 use crate::replay::{Recording, ReplayConfig, ReplayTraffic};

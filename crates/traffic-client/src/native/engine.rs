@@ -13,14 +13,14 @@ use driver_models::{Idm, ballistic};
 
 use super::boundary::Boundary;
 use super::changes::{DECISION_TICKS, EgoNeed, Wish, is_due};
-use super::config::{ClassConfig, TrafficConfig};
+use super::config::TrafficConfig;
 use super::driver::Driver;
 use super::ego::EgoSpans;
 use super::fleet::Fleet;
 use super::happenings::{Block, Plot, Rushing};
 use super::human::{Mind, Minds};
 use super::lanes::{LaneMap, NO_LANE};
-use super::neighbours::{EGO, LEFT, NOBODY, Neighbourhood, OWN, RIGHT, Seen};
+use super::neighbours::{EGO, LEFT, Neighbourhood, OWN, RIGHT, Seen};
 use super::window::{FAR_TICKS, Near, Stride};
 use super::workers::{InTurn, PIECE, Workers, in_pieces};
 
@@ -28,17 +28,8 @@ use super::workers::{InTurn, PIECE, Workers, in_pieces};
 pub(crate) const TICK_S: f64 = 0.1;
 /// Rest between two lane changes of a driver, s.
 const REST_S: f64 = 4.0;
-/// A driver takes the foot off the pedal for a lower limit ahead when it asks for this part of
-/// comfortable braking.
-const OFF_THE_PEDAL: f64 = 0.25;
 /// Room for so many wishes in a tick from the beginning.
 const WISHES: usize = 64;
-/// A vehicle stops this far before the end of its lane, m.
-const END_MARGIN_M: f64 = 2.0;
-
-/// Drivers adapt to the speed beyond the end of the road over this stretch before it, m.
-pub(crate) const BEYOND_M: f64 = 60.0;
-
 /// Everything that changes: what a snapshot holds.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct State {
@@ -315,116 +306,6 @@ impl Engine {
         };
         let seen = Seen { fleet, map, ego: &self.ego };
         self.near.find(seen, range, workers, piece, looks_aside);
-    }
-
-    /// The wanted acceleration as far as engine and tyres give it, m/s².
-    fn possible_m_s2(&self, i: usize) -> f64 {
-        let fleet = &self.state.fleet;
-        let (driver, class) = (&fleet.driver[i], self.class(i));
-        let power = driver.power_limit_m_s2(
-            fleet.v_m_s[i],
-            self.map.sin_grade(fleet.s_m[i]),
-            class.rolling_coeff,
-            class.drag_1_m,
-        );
-        self.raw_a_m_s2[i].min(power).max(-driver.idm.max_decel_m_s2)
-    }
-
-    pub(super) fn class(&self, i: usize) -> &ClassConfig {
-        self.config.class(self.state.fleet.driver[i].class)
-    }
-
-    /// Acceleration with nobody ahead in `lane`, m/s²: towards the desired speed and, where a lower
-    /// limit comes, towards that at its start, `-b_kin²/b` with the braking `b_kin` that it takes
-    /// (the IDM's own strategy, Treiber & Kesting 2013, Eq. 11.17).
-    pub(super) fn free_m_s2(&self, i: usize, lane: u16) -> f64 {
-        let fleet = &self.state.fleet;
-        let (s_m, v) = (fleet.s_m[i], fleet.v_m_s[i]);
-        let lane_map = &self.map.lanes[lane as usize];
-        let driver = &fleet.driver[i];
-        let section = lane_map.section(s_m);
-        let mut wish_m_s = section.limit_m_s.min(self.limit_m_s) * driver.limit_factor;
-        if s_m > self.map.s_end_m - BEYOND_M
-            && let Some(&beyond_m_s) = self.beyond_m_s.get(lane as usize)
-        {
-            wish_m_s = wish_m_s.min(beyond_m_s);
-        }
-        let free = driver.idm.free_m_s2(v, wish_m_s);
-        let (lower_at_m, lower_m_s) = section.lower;
-        let lower_m_s = lower_m_s * driver.limit_factor;
-        if v <= lower_m_s {
-            return free;
-        }
-        let b = driver.idm.decel_m_s2;
-        let needed = (v * v - lower_m_s * lower_m_s) / (2.0 * (lower_at_m - s_m).max(1.0));
-        if needed < OFF_THE_PEDAL * b { free } else { free.min(-needed * needed / b) }
-    }
-
-    /// What the leader in `lane` takes away, m/s², for the headway that the driver keeps now.
-    pub(super) fn behind_m_s2(&self, i: usize, leader: u32, lane: u16) -> f64 {
-        self.behind_at_m_s2(i, leader, lane, self.state.fleet.mind[i].headway_frac)
-    }
-
-    /// The same for another headway, as a part of the driver's own.
-    pub(super) fn behind_at_m_s2(&self, i: usize, leader: u32, lane: u16, frac: f64) -> f64 {
-        let seen = self.rear_and_speed(leader, lane);
-        seen.map_or(0.0, |seen| self.behind_that_m_s2(i, seen, frac))
-    }
-
-    /// The same behind somebody whose rear is there, m, and who has that speed, m/s.
-    pub(super) fn behind_that_m_s2(
-        &self,
-        i: usize,
-        (rear_m, speed_m_s): (f64, f64),
-        frac: f64,
-    ) -> f64 {
-        let fleet = &self.state.fleet;
-        let (v, idm) = (fleet.v_m_s[i], &fleet.driver[i].idm);
-        let (gap_m, closing_m_s) = fleet.mind[i].sees(rear_m - fleet.s_m[i], v - speed_m_s);
-        idm.content_with(frac).interaction_m_s2(v, gap_m, closing_m_s)
-    }
-
-    /// Acceleration in `lane` behind `leader`, m/s², with a part of the driver's own headway.
-    pub(super) fn in_lane_m_s2(&self, i: usize, leader: u32, lane: u16, frac: f64) -> f64 {
-        let taken = self.behind_at_m_s2(i, leader, lane, frac);
-        self.state.fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, lane), taken)
-    }
-
-    pub(super) fn rear_and_speed(&self, who: u32, lane: u16) -> Option<(f64, f64)> {
-        match who {
-            NOBODY => None,
-            EGO => self.ego.in_lane(lane).map(|span| (span.rear_m, self.ego.speed_m_s)),
-            j => {
-                let fleet = &self.state.fleet;
-                Some((fleet.rear_m(j as usize), fleet.v_m_s[j as usize]))
-            }
-        }
-    }
-
-    /// Car following in the lane, or in both lanes during a change, and the end of the lane.
-    fn follow_m_s2(&self, i: usize) -> f64 {
-        let fleet = &self.state.fleet;
-        let lane = fleet.lane[i];
-        let mut a = self.behind_m_s2(i, self.near.leader[i][OWN], lane);
-        let mut driven = lane;
-        if fleet.is_changing(i) {
-            driven = fleet.target[i];
-            let side = self.side_of(i, driven);
-            a = a.min(self.behind_m_s2(i, self.near.leader[i][side], driven));
-        }
-        if self.map.ends_early(driven) && fleet.driver[i].exit != driven {
-            let v = fleet.v_m_s[i];
-            let gap = self.map.lanes[driven as usize].s_end_m - END_MARGIN_M - fleet.s_m[i];
-            a = a.min(fleet.driver[i].idm.interaction_m_s2(v, gap, v));
-        }
-        if !self.blocks.is_empty() {
-            a = a.min(self.closure_m_s2(i, driven, END_MARGIN_M)).min(self.stop_m_s2(i));
-        }
-        fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, driven), a)
-    }
-
-    fn side_of(&self, i: usize, lane: u16) -> usize {
-        if self.near.lanes[i][LEFT] == lane { LEFT } else { RIGHT }
     }
 
     /// Moves every vehicle to the end of the tick, then lets vehicles out and in.

@@ -1,5 +1,6 @@
 //! Native traffic: IDM car following, MOBIL lane changes, inflow, ramps, grades, the ego seen by
 //! lateral overlap.
+mod accelerations;
 mod boundary;
 mod changes;
 mod config;
