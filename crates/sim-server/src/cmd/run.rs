@@ -100,7 +100,7 @@ pub(crate) struct Args {
     /// `--features foxglove`.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     foxglove: Option<u16>,
-    /// Another page that may show the run, by its origin (https://viewer.example, file://).
+    /// Another page that may show the run, by its origin (`https://viewer.example`, `file://`).
     #[arg(long, value_name = "ORIGIN", requires = "foxglove", value_parser = origin)]
     foxglove_origin: Vec<String>,
 }
