@@ -4,7 +4,7 @@
 //! `medium`, `large`, `pairs`, `outside`, `deleted`. Two lines per case, one for people (`.` exact,
 //! `+` first right, `-` nothing, `X` wrong) and one of JSON, then the table. `family=2` takes shapes,
 //! driver, roads and noise that were written apart (`tests/support/second`).
-//! `campaign calibration FILE...` pools the outputs of runs.
+//! `campaign calibration FILE... [plot=PICTURE.svg]` pools the outputs of runs.
 #![expect(
     clippy::disallowed_macros,
     clippy::disallowed_methods,
@@ -13,6 +13,8 @@
 
 #[path = "campaign/calibration.rs"]
 mod calibration;
+#[path = "real_data/plot.rs"]
+mod plot;
 #[allow(dead_code, reason = "each user of the generator needs a part of it")]
 #[path = "../tests/support/mod.rs"]
 mod support;
@@ -33,7 +35,7 @@ use support::random::{between, sign};
 use support::second::outside::SECOND_OUTSIDE;
 use support::{Campaign, generate_apart, second};
 
-const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR] [family=1|2]\n       campaign calibration FILE...";
+const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR] [family=1|2]\n       campaign calibration FILE... [plot=PICTURE.svg]";
 
 #[derive(Default)]
 struct Table {
@@ -321,11 +323,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let kind = arguments.first().ok_or(USAGE)?.as_str();
     if kind == "calibration" {
         let mut cases = Vec::new();
-        for file in arguments.get(1..).filter(|f| !f.is_empty()).ok_or(USAGE)? {
+        let given = arguments.get(1..).filter(|f| !f.is_empty()).ok_or(USAGE)?;
+        for file in given.iter().filter(|a| !a.starts_with("plot=")) {
             let text = std::fs::read_to_string(file).map_err(|e| format!("{file}: {e}"))?;
             cases.extend(calibration::read(&text).map_err(|e| format!("{file}: {e}"))?);
         }
         print!("{}", calibration::report(&cases));
+        if let Some(path) = given.iter().find_map(|a| a.strip_prefix("plot=")) {
+            calibration::draw(&cases, Path::new(path))?;
+        }
         return Ok(());
     }
     let count: usize = arguments.get(1).ok_or(USAGE)?.parse()?;

@@ -154,7 +154,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h(
         "heat_derate",
         &[P::HeatCoolant],
-        &[P::HeatCoolantStart],
+        &[P::HeatCoolantStart, P::HeatCoolantLag],
         &[[-8.0, 0.0], [-4.0, 0.0], [0.0, 0.0], [5.0, 0.0], [9.0, 0.0]],
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::CoolantTempDegc],
         0.01,

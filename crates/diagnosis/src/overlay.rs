@@ -78,9 +78,10 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("altitude_derate", "start_offset_m") => Plus("engine.derate_altitude_m", 1.0),
         ("heat_derate", "torque_loss_per_10_k_air") => Plus("engine.derate_air_1_k", 0.1),
         ("heat_derate", "air_start_offset_k") => Plus("engine.derate_air_k", 1.0),
-        ("heat_derate", "torque_loss_per_10_k_coolant" | "coolant_start_offset_k") => {
-            Nowhere("the truck file has no derating by coolant temperature")
-        }
+        (
+            "heat_derate",
+            "torque_loss_per_10_k_coolant" | "coolant_start_offset_k" | "derating_lag_s",
+        ) => Nowhere("the truck file has no derating by coolant temperature"),
         ("turbo_lag", "lag_s") => Plus("engine.slow_lag_s", 1.0),
         ("turbo_lag", "threshold_offset_frac") => Plus("engine.lag_threshold_frac", 1.0),
         ("pedal_delay", "delay_s") => Plus("engine.pedal_delay_s", 1.0),

@@ -83,10 +83,11 @@ pub(crate) enum P {
     Co2Power,
     LiningLag,
     PayloadSpread,
+    HeatCoolantLag,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 74;
+pub(crate) const PARAMS: usize = 75;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -212,6 +213,8 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::LiningLag, "lining_lag_s", "s", (20.0, 0.0, 120.0, 3.0), 0.0, 0.0),
     // Loads of 8 to 13.6 m, evenly spread: length²/12 is 0.5 to 1.6 of the usual 9.9 m².
     s(P::PayloadSpread, "gyration_squared_scale", "1", (0.25, -0.6, 0.8, 0.05), 0.0, 0.0),
+    // Engine controllers take torque away over seconds to a minute.
+    s(P::HeatCoolantLag, "derating_lag_s", "s", (20.0, 0.0, 120.0, 3.0), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -233,6 +236,7 @@ impl Spec {
                 | P::AltitudeStart
                 | P::HeatAirStart
                 | P::HeatCoolantStart
+                | P::HeatCoolantLag
                 | P::FuelLowLoad
                 | P::FuelLowOver
                 | P::RetarderFrom

@@ -2,10 +2,12 @@
 //! observed frequency, coverage of the intervals cause by cause.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use diagnosis::Diagnosis;
 use serde::{Deserialize, Serialize};
 
+use super::plot::{self, Panel, Series};
 use super::support::effects::Effect;
 use super::truth::{Interval, intervals};
 
@@ -63,27 +65,77 @@ pub(crate) fn read(text: &str) -> Result<Vec<Case>, serde_json::Error> {
     text.lines().filter(|l| l.starts_with('{')).map(serde_json::from_str).collect()
 }
 
+/// Stated probabilities and whether the cause was hidden (1 or 0). Where the true cause was taken
+/// away no probability of the catalogue can be right.
+fn stated(cases: &[Case]) -> Vec<(f64, f64)> {
+    let judged = cases.iter().filter(|c| c.kind != "deleted");
+    judged.flat_map(|c| &c.stated).map(|s| (s.1, f64::from(u8::from(s.2)))).collect()
+}
+
+/// One of ten bins of stated probability.
+struct Bin {
+    index: usize,
+    count: f64,
+    /// Means of what was stated and of what was so.
+    stated: f64,
+    seen: f64,
+}
+
+impl Bin {
+    /// 90 % interval of the frequency behind the observed one (Wilson, J. Am. Stat. Assoc. 22, 1927).
+    fn interval(&self) -> [f64; 2] {
+        const Z: f64 = 1.645;
+        let (n, p) = (self.count, self.seen);
+        let middle = (p + 0.5 * Z * Z / n) / (1.0 + Z * Z / n);
+        let half = Z / (1.0 + Z * Z / n) * (p * (1.0 - p) / n + 0.25 * Z * Z / (n * n)).sqrt();
+        [middle - half, middle + half]
+    }
+}
+
+/// The bins that hold anything.
+fn bins(stated: &[(f64, f64)]) -> Vec<Bin> {
+    let of = |index: usize| {
+        let here = || stated.iter().filter(move |s| ((s.0 * 10.0) as usize).min(9) == index);
+        let count = here().count() as f64;
+        let mean = |f: fn(&(f64, f64)) -> f64| here().map(f).sum::<f64>() / count;
+        (count > 0.0).then(|| Bin { index, count, stated: mean(|s| s.0), seen: mean(|s| s.1) })
+    };
+    (0..10).filter_map(of).collect()
+}
+
+/// Observed over stated frequency, as a picture.
+pub(crate) fn draw(cases: &[Case], path: &Path) -> std::io::Result<()> {
+    let bins = bins(&stated(cases));
+    let points = |f: fn(&Bin) -> f64| bins.iter().map(|b| (b.stated, f(b))).collect::<Vec<_>>();
+    let line = vec![(0.0, 0.0), (1.0, 1.0)];
+    let intervals = bins.iter().map(|b| {
+        let points = b.interval().map(|y| (b.stated, y)).to_vec();
+        Series { name: "", points, line: true }
+    });
+    let mut series = vec![
+        Series { name: "as stated", points: line, line: true },
+        Series {
+            name: "causes and rivals, 90 % interval",
+            points: points(|b| b.seen),
+            line: false,
+        },
+    ];
+    series.extend(intervals);
+    let title = format!("{} cases, {} probabilities", cases.len(), stated(cases).len());
+    let (x, y) = ("stated probability", "hidden");
+    plot::write(path, &[Panel { title: &title, x, y, series }])
+}
+
 /// Ten bins, scores, and coverage per cause, as text.
 pub(crate) fn report(cases: &[Case]) -> String {
     let mut out = format!("{} cases\n\n", cases.len());
-    // Where the true cause was taken away no probability of the catalogue can be right.
-    let judged = cases.iter().filter(|c| c.kind != "deleted");
-    let stated: Vec<(f64, f64)> =
-        judged.flat_map(|c| &c.stated).map(|s| (s.1, f64::from(u8::from(s.2)))).collect();
+    let stated = stated(cases);
     let count = stated.len().max(1) as f64;
     out += "stated probability, observed frequency\n";
     let mut error = 0.0;
-    for bin in 0..10 {
-        let here: Vec<&(f64, f64)> =
-            stated.iter().filter(|s| ((s.0 * 10.0) as usize).min(9) == bin).collect();
-        if here.is_empty() {
-            continue;
-        }
-        let n = here.len() as f64;
-        let mean = here.iter().map(|s| s.0).sum::<f64>() / n;
-        let seen = here.iter().map(|s| s.1).sum::<f64>() / n;
+    for Bin { index, count: n, stated: mean, seen } in bins(&stated) {
         error += n / count * (mean - seen).abs();
-        let (low, high) = (bin as f64 / 10.0, (bin + 1) as f64 / 10.0);
+        let (low, high) = (index as f64 / 10.0, (index + 1) as f64 / 10.0);
         out += &format!("{low:.1} to {high:.1}: {n:4} stated, mean {mean:.3}, hidden {seen:.3}\n");
     }
     let mean =

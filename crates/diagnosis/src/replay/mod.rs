@@ -200,6 +200,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::HeatAirStart
         | P::HeatCoolant
         | P::HeatCoolantStart
+        | P::HeatCoolantLag
         | P::TurboLag
         | P::TurboStart
         | P::PedalDelay

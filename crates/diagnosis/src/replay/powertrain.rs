@@ -1,5 +1,7 @@
 //! Engine torque from pedal and engine speed, shift durations, fuel from torque and speed.
 
+use std::sync::Arc;
+
 use dynamics::effects::engine::left_frac;
 use dynamics::effects::instruments::scale_at_rate;
 use dynamics::effects::shift::ShiftPhase;
@@ -29,7 +31,7 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let pedal = d.profiles.get(Kind::Pedal, [delay], || {
         (0..d.n).map(|i| at_index(&d.pedal, i as f64 - delay)).collect()
     });
-    let derating = Derating::new(plant, t);
+    let derating = Derating::new(d, plant, t);
     let mut out = vec![0.0; valid.len()];
     let mut torque = 0.0;
     let mut running = false;
@@ -81,15 +83,15 @@ impl Rise {
 }
 
 /// What altitude, air and coolant temperature take from the full load: loss per unit, and where it
-/// begins (m, degC, degC).
+/// begins (m, degC), or by how much it is exceeded (K).
 struct Derating {
     thin: (f64, f64),
     hot: (f64, f64),
-    boiling: (f64, f64),
+    boiling: Option<(f64, Arc<[f64]>)>,
 }
 
 impl Derating {
-    fn new(plant: &Plant, t: &Theta) -> Self {
+    fn new(d: &Prepared, plant: &Plant, t: &Theta) -> Self {
         let (file, at) = (&plant.truck.engine, |p: P| t[p as usize]);
         let air_degc = file.derate_air_k - ZERO_DEGC_K;
         Self {
@@ -98,20 +100,44 @@ impl Derating {
                 file.derate_altitude_m + at(P::AltitudeStart),
             ),
             hot: (file.derate_air_1_k + 0.1 * at(P::HeatAir), air_degc + at(P::HeatAirStart)),
-            boiling: (0.1 * at(P::HeatCoolant), COOLANT_DEGC + at(P::HeatCoolantStart)),
+            boiling: (at(P::HeatCoolant) != 0.0).then(|| {
+                let from_degc = COOLANT_DEGC + at(P::HeatCoolantStart);
+                (0.1 * at(P::HeatCoolant), overheat(d, from_degc, at(P::HeatCoolantLag)))
+            }),
         }
     }
 
     /// Part of the full load that is left at a sample.
     #[inline]
     fn left(&self, d: &Prepared, i: usize) -> f64 {
-        if [self.thin.0, self.hot.0, self.boiling.0] == [0.0; 3] {
+        if [self.thin.0, self.hot.0] == [0.0; 2] && self.boiling.is_none() {
             return 1.0;
         }
         let left = |(loss, from): (f64, f64), x: f64| left_frac(loss, x, from);
         let air = left(self.thin, d.altitude[i]) * left(self.hot, d.ambient[i]);
-        (air * left(self.boiling, d.coolant[i])).clamp(0.2, 1.5)
+        let coolant =
+            self.boiling.as_ref().map_or(1.0, |(loss, over)| left_frac(*loss, over[i], 0.0));
+        (air * coolant).clamp(0.2, 1.5)
     }
+}
+
+/// How far the coolant is above where the engine protects itself, K, as its controller follows it.
+fn overheat(d: &Prepared, from_degc: f64, lag_s: f64) -> Arc<[f64]> {
+    d.profiles.get(Kind::Overheat, [from_degc, lag_s], || followed_k(&d.coolant, from_degc, lag_s))
+}
+
+/// A temperature above a threshold, K, followed with a lag up and down: protection that jumped would
+/// be felt as a jerk.
+fn followed_k(degc: &[f64], from_degc: f64, lag_s: f64) -> Vec<f64> {
+    let keep = if lag_s > 0.0 { (-Drive::STEP_S / lag_s).exp() } else { 0.0 };
+    let mut followed_k = 0.0;
+    degc.iter()
+        .map(|degc| {
+            let over_k = (degc - from_degc).max(0.0);
+            followed_k = over_k + (followed_k - over_k) * keep;
+            followed_k
+        })
+        .collect()
 }
 
 /// Measured minus expected duration of every shift, s.
@@ -202,6 +228,19 @@ pub(super) fn noise_g_s(fuel_g_s: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_derating_follows_the_coolant_with_its_lag_and_at_once_without_one() {
+        let step: Vec<f64> = (0..2_000).map(|i| if i < 1_000 { 103.0 } else { 90.0 }).collect();
+        let (lagged, at_once) = (followed_k(&step, 98.0, 20.0), followed_k(&step, 98.0, 0.0));
+        for i in [0, 10, 400, 999] {
+            let t_s = (i + 1) as f64 * Drive::STEP_S;
+            assert!((lagged[i] - 5.0 * (1.0 - (-t_s / 20.0).exp())).abs() < 1e-9);
+            assert_eq!(at_once[i], 5.0);
+        }
+        let left = (-1_000.0 * Drive::STEP_S / 20.0).exp();
+        assert!((lagged[1_999] - lagged[999] * left).abs() < 1e-9 && at_once[1_999] == 0.0);
+    }
 
     #[test]
     fn a_sample_across_the_threshold_is_that_of_many_small_steps() {

@@ -25,6 +25,8 @@ pub(super) enum Kind {
     Load,
     /// Pedal after its dead time.
     Pedal,
+    /// Coolant above where derating begins, K; over that temperature and the lag.
+    Overheat,
 }
 
 /// Most signals kept per drive.

@@ -240,6 +240,8 @@ pub(crate) struct Memory {
     fan: f64,
     /// Brake linings over the air, K.
     lining_k: f64,
+    /// Coolant above where the engine takes torque away, as its controller follows it, K.
+    overheat_k: f64,
     pub(crate) gust: f64,
 }
 
@@ -278,11 +280,16 @@ pub(crate) fn act(
         }
         "heat_derate" => {
             let over = if shape.choice(1, 2) == 0 {
-                now.ambient_degc - shape.at(0, 22.0, 32.0)
+                (now.ambient_degc - shape.at(0, 22.0, 32.0)).max(0.0)
             } else {
-                now.coolant_degc - shape.at(0, 93.0, 100.0)
+                // At once, or as the controller ramps it.
+                let tau = if shape.choice(2, 2) == 0 { 0.0 } else { shape.at(3, 5.0, 60.0) };
+                let over = (now.coolant_degc - shape.at(0, 93.0, 100.0)).max(0.0);
+                let keep = (-dt / f64::max(tau, 1e-3)).exp();
+                m.overheat_k = over + (m.overheat_k - over) * keep;
+                m.overheat_k
             };
-            a.derate *= 1.0 - (0.1 * size * over.max(0.0)).min(0.6);
+            a.derate *= 1.0 - (0.1 * size * over).min(0.6);
         }
         "brake_fade" => {
             // Linings as hot as the discs, or behind them.
