@@ -46,6 +46,9 @@ pub(super) enum What {
     Collision { collisions: u32 },
 }
 
+/// Events that are not in the log yet, with their times, s.
+pub(super) type Found = Vec<(f64, What)>;
+
 /// The latest events of a session.
 #[derive(Debug, Default)]
 pub(super) struct EventLog {
@@ -89,22 +92,22 @@ const SAME_WISH_TICKS: u32 = 200;
 
 impl Watcher {
     /// What a tick brought.
-    pub(super) fn tick(&mut self, tick: &Tick<'_>, log: &mut EventLog) {
+    pub(super) fn tick(&mut self, tick: &Tick<'_>, found: &mut Found) {
         let (plan, time_s): (&Plan, f64) = (tick.plan, tick.now.seconds());
         if plan.maneuver != self.maneuver {
             self.maneuver = plan.maneuver;
-            log.add(time_s, What::Maneuver { maneuver: plan.maneuver, reason: plan.reason });
+            found.push((time_s, What::Maneuver { maneuver: plan.maneuver, reason: plan.reason }));
         }
         self.quiet_ticks = self.quiet_ticks.saturating_add(1);
         if let Some(refusal) = plan.refusal {
             if self.refusal != Some(refusal) || self.quiet_ticks > SAME_WISH_TICKS {
-                log.add(time_s, What::Refusal { refusal, reason: plan.reason });
+                found.push((time_s, What::Refusal { refusal, reason: plan.reason }));
             }
             (self.refusal, self.quiet_ticks) = (Some(refusal), 0);
         }
         if plan.guard != self.guard {
             self.guard.clone_from(&plan.guard);
-            log.add(time_s, What::Guard { reasons: plan.guard.clone() });
+            found.push((time_s, What::Guard { reasons: plan.guard.clone() }));
         }
     }
 
@@ -114,26 +117,26 @@ impl Watcher {
         time_s: f64,
         state: RunState,
         summary: &Summary,
-        log: &mut EventLog,
+        found: &mut Found,
     ) {
         if summary.off_road_events != self.off_road {
             self.off_road = summary.off_road_events;
-            log.add(time_s, What::OffRoad { events: self.off_road });
+            found.push((time_s, What::OffRoad { events: self.off_road }));
         }
         if summary.collisions != self.collisions {
             self.collisions = summary.collisions;
-            log.add(time_s, What::Collision { collisions: self.collisions });
+            found.push((time_s, What::Collision { collisions: self.collisions }));
         }
         if self.state.replace(state) != Some(state) {
-            log.add(time_s, What::State { state });
+            found.push((time_s, What::State { state }));
         }
     }
 
     /// How the run is set; how it began is no event.
-    pub(super) fn settings(&mut self, time_s: f64, now: Settings, log: &mut EventLog) {
+    pub(super) fn settings(&mut self, time_s: f64, now: Settings, found: &mut Found) {
         let was = self.settings.replace(now.clone());
         if was.is_some_and(|was| was != now) {
-            log.add(time_s, What::Settings(now));
+            found.push((time_s, What::Settings(now)));
         }
     }
 }
@@ -147,7 +150,11 @@ mod tests {
     fn tick(watcher: &mut Watcher, log: &mut EventLog, at_s: f64, plan: &Plan) {
         let (ego, scene) = (EgoState::default(), Scene::default());
         let now = Time::from_seconds(at_s);
-        watcher.tick(&Tick { now, ego: &ego, scene: &scene, plan }, log);
+        let mut found = Found::new();
+        watcher.tick(&Tick { now, ego: &ego, scene: &scene, plan }, &mut found);
+        for (time_s, what) in found {
+            log.add(time_s, what);
+        }
     }
 
     #[test]

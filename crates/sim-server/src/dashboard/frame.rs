@@ -31,7 +31,7 @@ pub(super) struct Frame<'a, R> {
     pub(super) plan: Planned<'a>,
     /// The vehicle ahead.
     pub(super) lead: Option<Lead>,
-    pub(super) speed_ahead: SpeedAhead,
+    pub(super) speed_ahead: &'a SpeedAhead,
     /// None where no ghost drives along.
     pub(super) ghost: Option<GhostHere>,
     pub(super) neighbours: Vec<Other>,

@@ -1,7 +1,8 @@
 //! The live dashboard: an HTTP and WebSocket server on the loopback interface with its page.
 //!
-//! The world's thread owns a [`Publisher`], which leaves the latest frame and the strip plots'
-//! columns in [`Shared`]; it never waits for a viewer. Each viewer takes the latest frame when it
+//! The world's thread owns a [`Publisher`], which leaves the strip plots' columns and events in
+//! [`Shared`] and hands what a frame is made of to an encoder's thread, which leaves the latest
+//! frame there; neither waits for a viewer. Each viewer takes the latest frame when it
 //! can (frames between are lost to it) and all columns since its last visit (none are lost).
 
 mod access;
@@ -10,6 +11,7 @@ mod api;
 mod assets;
 mod bus;
 mod connections;
+mod encoder;
 mod events;
 mod frame;
 mod gate;

@@ -11,7 +11,7 @@ use tractrix_core::{Recorder, Tick, Time};
 use super::ahead::{Lead, SpeedAhead};
 use super::frame::{Ego, Frame, Here, Other, Planned, Refused, Snapshot};
 use super::road_json;
-use super::strip::{Strip, round};
+use super::strip::{RowsDue, Strip, round};
 use crate::failure::Failure;
 use crate::provenance::Provenance;
 use crate::replayed::{Again, Setup};
@@ -57,6 +57,7 @@ struct Keeper {
     last: Option<Snapshot>,
     last_refusal: Option<Refused>,
     strip: Strip,
+    rows: RowsDue,
 }
 
 impl Recorder for Keeper {
@@ -65,7 +66,7 @@ impl Recorder for Keeper {
             let (reason, time_s) = (tick.plan.reason, tick.now.seconds());
             self.last_refusal = Some(Refused { refusal, reason, time_s });
         }
-        if self.strip.is_due(tick) {
+        if self.rows.take(tick) {
             self.strip.push(tick);
         }
         if tick.now.seconds() + 1e-9 < self.due_s {
@@ -99,6 +100,7 @@ impl Playback {
             last: None,
             last_refusal: None,
             strip: Strip::default(),
+            rows: RowsDue::default(),
         };
         let mut ticks_different = 0;
         // The end of a torn recording is where it was torn
@@ -173,7 +175,7 @@ impl Playback {
             road: Here::new(&self.road, &kept.ego, kept.plan.lane),
             plan: Planned::from(&kept.plan),
             lead: Lead::of(&kept.plan, &kept.ego, &kept.scene, self.front_m),
-            speed_ahead: ahead.clone(),
+            speed_ahead: ahead,
             ghost: None,
             neighbours: kept.scene.neighbours.iter().map(Other::from).collect(),
         };

@@ -5,28 +5,29 @@ use std::time::Duration;
 
 use planner::decider::DeciderKind;
 use road::Road;
-use serde::Serialize;
-use sim::{GhostReport, Scenario, Summary, World};
+use sim::{Scenario, World};
 use tractrix_core::{Recorder, Tick};
 
 use super::Shared;
-use super::ahead::{Lead, SpeedAhead};
-use super::events::{Watcher, What};
-use super::frame::{Ego, Frame, GhostHere, Here, Other, Planned, Refused, Run, Snapshot};
+use super::ahead::SpeedAhead;
+use super::encoder::{About, Encoder, Moment};
+use super::events::{Found, Watcher, What};
+use super::frame::{Refused, Snapshot};
 use super::settings::Settings;
-use super::strip::round;
+use super::strip::RowsDue;
 use crate::provenance::Provenance;
 use crate::session::{Pace, RunState};
 
-/// Turns ticks into frames; lives in the world's thread.
+/// Keeps what viewers are to see of a tick, and hands it to the [`Encoder`] when a frame is due; lives
+/// in the world's thread. A tick that brings no event and no row takes no lock that viewers share.
 pub(crate) struct Publisher {
     shared: Arc<Shared>,
-    provenance: Provenance,
-    run_id: String,
-    scenario: String,
-    road: Arc<Road>,
+    encoder: Encoder,
     snapshot: Option<Snapshot>,
     watcher: Watcher,
+    /// Events on their way to the log.
+    found: Found,
+    rows: RowsDue,
     /// Wall and simulated seconds of an earlier frame, for the factor.
     mark: (f64, f64),
     realtime_factor: f64,
@@ -34,17 +35,6 @@ pub(crate) struct Publisher {
 
 /// The real-time factor is measured over this wall time, s.
 const FACTOR_WINDOW_S: f64 = 0.5;
-
-/// The summary under way as `/api/v1/summary` answers it.
-#[derive(Serialize)]
-struct SummarySoFar<'a> {
-    #[serde(flatten)]
-    provenance: Provenance,
-    #[serde(flatten)]
-    summary: &'a Summary,
-    saving_frac: Option<f64>,
-    ghost: Option<GhostReport>,
-}
 
 impl Publisher {
     /// A publisher of one run.
@@ -57,14 +47,15 @@ impl Publisher {
     ) -> Self {
         let seed = provenance.seed();
         shared.events().add(0.0, What::RunBegan { run_id: run_id.clone(), seed });
+        let scenario = scenario.name.clone();
+        let about = About { shared: Arc::clone(&shared), provenance, run_id, scenario, road };
         Self {
             shared,
-            provenance,
-            run_id,
-            scenario: scenario.name.clone(),
-            road,
+            encoder: Encoder::start(about),
             snapshot: None,
             watcher: Watcher::default(),
+            found: Found::new(),
+            rows: RowsDue::default(),
             mark: (0.0, 0.0),
             realtime_factor: 0.0,
         }
@@ -78,57 +69,28 @@ impl Publisher {
             self.realtime_factor = (time_s - self.mark.1) / (wall_s - self.mark.0);
             self.mark = (wall_s, time_s);
         }
+        self.shared.metrics.realtime_factor.set(self.realtime_factor);
         self.note_health(world);
-        let (summary, ghost, settings) = (world.summary(), world.ghost(), Settings::of(world));
-        let frame = Frame {
-            provenance: self.provenance,
-            kind: "frame",
-            run_id: &self.run_id,
-            time_s,
-            run: Run {
-                scenario: &self.scenario,
-                state,
-                external_decider: world.stack().config().decider == DeciderKind::External,
-                settings: settings.clone(),
-                pace,
-                realtime_factor: round(self.realtime_factor, 100.0),
-                distance_m: round(summary.distance_m, 10.0),
-                mean_speed_m_s: round(summary.mean_speed_m_s, 1e3),
-                lane_changes: summary.lane_changes,
-                collisions: summary.collisions,
-                guard_activations: summary.guard_activations,
-                off_road: world.is_off_road(),
-                off_road_events: summary.off_road_events,
-                off_road_time_s: round(summary.off_road_time_s, 100.0),
-                max_lateral_error_m: round(summary.max_lateral_error_m, 1e4),
-                min_time_to_collision_s: summary.min_time_to_collision_s.map(|t| round(t, 100.0)),
-                set_speed_m_s: round(world.stack().config().set_speed_m_s, 1e2),
-                last_refusal: tick.last_refusal,
-            },
-            ego: Ego::from(&tick.ego),
-            road: Here::new(&self.road, &tick.ego, tick.plan.lane),
-            plan: Planned::from(&tick.plan),
-            lead: Lead::of(&tick.plan, &tick.ego, &tick.scene, world.geometry().front_m),
+        let (summary, settings) = (world.summary(), Settings::of(world));
+        self.watcher.run(time_s, state, &summary, &mut self.found);
+        self.watcher.settings(time_s, settings.clone(), &mut self.found);
+        // Before the frame, which wakes the viewers: no other one may follow it
+        tell(&mut self.found, &self.shared);
+        let config = world.stack().config();
+        self.encoder.hand_over(Box::new(Moment {
+            tick: tick.clone(),
+            state,
+            pace,
+            realtime_factor: self.realtime_factor,
+            external_decider: config.decider == DeciderKind::External,
+            set_speed_m_s: config.set_speed_m_s,
+            off_road: world.is_off_road(),
+            front_m: world.geometry().front_m,
+            settings,
+            summary,
+            ghost: world.ghost(),
             speed_ahead: SpeedAhead::of(&tick.plan, world.stack().speed_plan(), tick.ego.s_m),
-            ghost: ghost.map(|report| GhostHere::new(&self.road, report)),
-            neighbours: tick.scene.neighbours.iter().map(Other::from).collect(),
-        };
-        let so_far = SummarySoFar {
-            provenance: self.provenance,
-            summary: &summary,
-            saving_frac: ghost.and_then(|ghost| ghost.saving_frac),
-            ghost,
-        };
-        if let (Ok(frame), Ok(so_far)) =
-            (serde_json::to_string(&frame), serde_json::to_string(&so_far))
-        {
-            *self.shared.summary() = so_far.into();
-            self.shared.metrics.realtime_factor.set(self.realtime_factor);
-            let events = &mut self.shared.events();
-            self.watcher.run(time_s, state, &summary, events);
-            self.watcher.settings(time_s, settings, events);
-            self.shared.publish(frame.into(), state == RunState::Finished);
-        }
+        }));
     }
 
     /// What is not in order about truck, bus and commands.
@@ -147,16 +109,29 @@ impl Publisher {
         self.shared.metrics.note_tick(work, missed_deadline);
     }
 
-    /// Replaces the summary under way by the final one.
-    pub(crate) fn publish_summary(&self, summary_json: &str) {
+    /// Replaces the summary under way by the final one, behind the last frame.
+    pub(crate) fn publish_summary(&mut self, summary_json: &str) {
+        self.encoder.end();
         *self.shared.summary() = summary_json.into();
+    }
+}
+
+/// Puts what was found into the log, which is left alone where nothing was.
+fn tell(found: &mut Found, shared: &Shared) {
+    if found.is_empty() {
+        return;
+    }
+    let mut log = shared.events();
+    for (time_s, what) in found.drain(..) {
+        log.add(time_s, what);
     }
 }
 
 impl Recorder for Publisher {
     fn record(&mut self, tick: &Tick<'_>) {
         self.shared.metrics.guard_ticks.inc_by((!tick.plan.guard.is_empty()).into());
-        self.watcher.tick(tick, &mut self.shared.events());
+        self.watcher.tick(tick, &mut self.found);
+        tell(&mut self.found, &self.shared);
         let kept = self.snapshot.get_or_insert_default();
         kept.now = tick.now;
         kept.ego = *tick.ego;
@@ -166,9 +141,75 @@ impl Recorder for Publisher {
             let (reason, time_s) = (tick.plan.reason, tick.now.seconds());
             kept.last_refusal = Some(Refused { refusal, reason, time_s });
         }
-        let mut strip = self.shared.strip();
-        if strip.is_due(tick) {
-            strip.push(tick);
+        if self.rows.take(tick) {
+            self.shared.strip().push(tick);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::AtomicBool;
+
+    use serde_json::Value;
+    use tokio::sync::watch;
+
+    use super::super::{MAX_FRAMES, Metrics, Published};
+    use super::*;
+    use crate::session;
+
+    const FRAMES: u32 = 300;
+
+    fn shared(scenario: &Scenario, world: &World) -> Arc<Shared> {
+        let (handle, _) = session::channel(scenario, 1, None);
+        let (id, stop) = ("s".into(), Arc::new(AtomicBool::new(false)));
+        Shared::new(&id, session::setting(world), handle, &Metrics::new(), stop)
+    }
+
+    /// Looks at the log as soon as it has a frame, until the last one.
+    async fn look(shared: &Shared, mut frames: watch::Receiver<Published>) -> u32 {
+        for seen in 1.. {
+            frames.changed().await.unwrap();
+            let frame = frames.borrow_and_update().clone();
+            let events = serde_json::to_value(shared.events().since(0).0).unwrap();
+            let shown: Value = serde_json::from_str(&frame.json).unwrap();
+            let time_s = |of: &Value| of["time_s"].as_f64().unwrap();
+            let is_told = events.as_array().unwrap().iter().any(|event| {
+                let is_then = (time_s(event) - time_s(&shown)).abs() < 1e-3;
+                is_then && event["state"] == shown["run"]["state"]
+            });
+            assert!(is_told, "at {} s", shown["time_s"]);
+            if frame.is_last {
+                return seen;
+            }
+        }
+        0
+    }
+
+    /// Every frame here shows another state of the run, which is an event.
+    #[test]
+    fn events_are_told_before_their_frame_and_the_last_frame_is_seen() {
+        let scenario = Scenario::builtin("flat").unwrap();
+        let mut world = World::new(&scenario, 1).unwrap();
+        let shared = shared(&scenario, &world);
+        let (frames, run_id) = (shared.frame.subscribe(), "run".to_owned());
+        let (provenance, road) = (Provenance::of_seed(1), Arc::clone(world.road()));
+        let of = Arc::clone(&shared);
+        let mut publisher = Publisher::new(of, provenance, run_id, &scenario, road);
+        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        std::thread::scope(|threads| {
+            let viewer = threads.spawn(|| runtime.block_on(look(&shared, frames)));
+            for k in 0..FRAMES {
+                world.tick(&mut publisher).unwrap();
+                let state = if k % 2 == 0 { RunState::Running } else { RunState::Paused };
+                publisher.publish(state, Pace::Max, Duration::ZERO, &world);
+            }
+            publisher.publish(RunState::Finished, Pace::Max, Duration::ZERO, &world);
+            publisher.publish_summary("the final one");
+            let seen = viewer.join().unwrap();
+            assert!((1..=FRAMES + 1).contains(&seen));
+        });
+        assert_eq!(&**shared.summary(), "the final one");
+        assert!(shared.frames_since(0).0.len() <= MAX_FRAMES);
     }
 }

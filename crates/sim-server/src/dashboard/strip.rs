@@ -26,15 +26,6 @@ impl Strip {
         self.s_m.len()
     }
 
-    /// Whether a row is due.
-    pub(crate) fn is_due(&self, tick: &Tick<'_>) -> bool {
-        let passed = |column: &[f64], now: f64, spacing: f64| {
-            column.last().is_none_or(|last| now >= last + spacing)
-        };
-        passed(&self.s_m, tick.ego.s_m, SPACING_M)
-            || passed(&self.time_s, tick.now.seconds(), SPACING_S)
-    }
-
     /// Adds a row.
     pub(crate) fn push(&mut self, tick: &Tick<'_>) {
         let p = &tick.ego.powertrain;
@@ -61,6 +52,28 @@ impl Strip {
             fuel_used_g: tail(&self.fuel_used_g),
             lateral_error_m: tail(&self.lateral_error_m),
         }
+    }
+}
+
+/// When rows are due, without a look at those that there are.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct RowsDue {
+    /// Place and time of the last row, m and s.
+    last: Option<(f64, f64)>,
+}
+
+impl RowsDue {
+    /// Whether a row is due; it is taken to be added.
+    pub(crate) fn take(&mut self, tick: &Tick<'_>) -> bool {
+        let (s_m, time_s) = (tick.ego.s_m, tick.now.seconds());
+        let is_due = self.last.is_none_or(|(last_m, last_s)| {
+            s_m >= last_m + SPACING_M || time_s >= last_s + SPACING_S
+        });
+        if is_due {
+            // As the row has them, so that rows stay where they are
+            self.last = Some((round(s_m, 10.0), round(time_s, 100.0)));
+        }
+        is_due
     }
 }
 

@@ -83,7 +83,7 @@ fn keep_elsewhere(json: &str) -> Option<PathBuf> {
 
 /// Closes the recording and writes the summary, also of a run that failed.
 pub(super) fn finish(
-    ended: Ended,
+    mut ended: Ended,
     provenance: Provenance,
     out: &OutFolder,
 ) -> Result<(RunReport, String), Failure> {
@@ -95,7 +95,7 @@ pub(super) fn finish(
     };
     let summary = RunReport::new(provenance.into(), &ended.world, Some(ended.reason), wall);
     let json = serde_json::to_string_pretty(&summary).map_err(Failure::work)?;
-    if let Some(publisher) = &ended.publisher {
+    if let Some(publisher) = &mut ended.publisher {
         publisher.publish_summary(&json);
     }
     let recorded = ended.recording.finish(&json);

@@ -52,6 +52,7 @@ function show(bus) {
     + `${f.refused} demands refused, ${f.unsent} frames without room, ${bus.errors} errors.`;
   $("faults").textContent = bus.faults.length === 0 ? (direct ? "" : "All in order.")
     : bus.faults.map(({ fault, since_s }) => `${fault.replaceAll("_", " ")} since ${since_s.toFixed(1)} s`).join(" · ");
+  $("faults").hidden = $("faults").textContent === "";
   $("faults").dataset.same = bus.faults.length > 0 ? "no" : "yes";
   const open = new Set([...document.querySelectorAll("#messages tr:has(details[open])")].map((tr) => tr.dataset.key));
   $("messages").replaceChildren(...bus.messages.flatMap(row));
@@ -70,6 +71,7 @@ async function begin() {
   $("no-session").hidden = one !== undefined;
   for (const id of ["messages-panel", "claims-panel"]) $(id).hidden = one === undefined;
   if (one === undefined) return;
+  $("others").hidden = sessions.length < 2;
   $("others").replaceChildren(...sessions.length < 2 ? [] : sessions.flatMap((s) =>
     [make("a", { href: `/bus?session=${encodeURIComponent(s.id)}`, "aria-current": s === one ? "page" : null }, s.id), " "]));
   look(`/api/v1/sessions/${encodeURIComponent(one.id)}/bus`);
