@@ -17,7 +17,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,7 +49,7 @@ async def dead(url: str, seen: Seen) -> None:
 
 def viewers(kind: str, url: str) -> list[Coroutine[Any, Any, None]]:
     """Those of one kind of run."""
-    one = {
+    one: dict[str, Callable[[], Coroutine[Any, Any, None]]] = {
         "slow": lambda: look(url, Seen("slow"), SLOW_S),
         "stalled": lambda: stall(url, Seen("stalled")),
         "dead": lambda: dead(url, Seen("dead")),
@@ -137,7 +137,9 @@ def main() -> int:
             measured = measure(arguments.server, options, folder)
             found.append(asyncio.run(asyncio.wait_for(measured, limit_s)))
     print(f"{rounds} rounds of {seconds} s, load {os.getloadavg()[0]:.1f} at the end")
-    return int(not all([judge(server, found) for server in arguments.server]))
+    # Each prints what it found
+    are_good = [judge(server, found) for server in arguments.server]
+    return int(not all(are_good))
 
 
 def judge(server: Path, rounds: list[dict[tuple[Path, str], Ran]]) -> bool:

@@ -31,7 +31,7 @@ rm -rf "$work" && mkdir -p "$work/src"
 "$binary" "$work/src"
 cp -r "$here/../../crates/recording/msg/truck_msgs" "$work/src/"
 export AMENT_PREFIX_PATH=$prefix:$venv CMAKE_PREFIX_PATH=$prefix:$venv LD_LIBRARY_PATH=$prefix/lib:$venv/lib PATH=$venv/bin:$PATH
-for package in tf2_msgs autoware_control_msgs autoware_vehicle_msgs truck_msgs simulation_interfaces; do
+for package in tf2_msgs can_msgs autoware_control_msgs autoware_vehicle_msgs truck_msgs simulation_interfaces; do
   { cmake -S "$work/src/$package" -B "$work/build/$package" -G Ninja -DCMAKE_INSTALL_PREFIX="$prefix" \
     -DPython3_EXECUTABLE="$python" -DBUILD_TESTING=OFF -DCMAKE_CXX_FLAGS=-O0 -DCMAKE_C_FLAGS=-O0 &&
     nice cmake --build "$work/build/$package" --target install; } >"$venv/log" 2>&1 ||

@@ -7,6 +7,7 @@
 //! | `frame` | an identifier and up to eight bytes | SAE J1939-21, 5.1 |
 //! | `request` | requests for a group and their acknowledgment | SAE J1939-21, 5.4 |
 //! | `tp` | messages of more than eight bytes | SAE J1939-21, 5.10 |
+//! | `listen` | those messages where they are only listened to | |
 //! | `claim` | getting and keeping an address | SAE J1939-81 |
 //! | `supervise` | notices what is lost, spoofed, taken over, flooded | |
 //! | `wire` | how long a frame takes, how busy a bus is | ISO 11898-1 |
@@ -35,6 +36,7 @@ mod error;
 mod frame;
 mod id;
 pub mod ident;
+mod listen;
 pub mod message;
 mod request;
 mod signal;
@@ -53,6 +55,7 @@ pub use claim::{ADDRESS_CLAIMED_PGN, AddressClaim, COMMANDED_ADDRESS_PGN, ClaimS
 pub use error::J1939Error;
 pub use frame::Frame;
 pub use id::{GLOBAL_ADDRESS, Id, NULL_ADDRESS, PGN_MAX};
+pub use listen::{Assembler, Whole};
 pub use message::{Message, MessageTable};
 pub use request::{ACKNOWLEDGMENT_PGN, Acknowledgment, Answer, REQUEST_PGN, Request};
 pub use signal::Signal;

@@ -33,7 +33,7 @@ pub use recorder::{Backlog, BusHeader, Listener, Recording, RunHeader, Torn};
 pub use recover::{Recovered, recover, recover_into};
 pub use schedule::{Due, Schedule};
 pub use telemetry::{Combination, Geodesy, Scenery, lanes_at_start, messages, static_frames};
-pub use topic::{TOPICS, Topic, TopicMessage};
+pub use topic::{BUS_FRAMES, TOPICS, Topic, TopicMessage, bus_name};
 
 #[cfg(test)]
 mod tests {

@@ -12,7 +12,7 @@ use crate::file::McapFile;
 use crate::inputs::{BUS_RECORD, BusTrace, DRIVER_KEY, StepNotes};
 use crate::schedule::Schedule;
 use crate::telemetry::Scenery;
-use crate::topic::TopicMessage;
+use crate::topic::{TopicMessage, bus_name};
 use crate::writer::{Note, Queued, Record, RunEnd, Writer};
 
 /// What a recording says about its run.
@@ -30,8 +30,9 @@ pub struct RunHeader {
     pub listener: Option<Listener>,
 }
 
-/// Hears every message of [`messages`](crate::messages) with its time and the bytes that the file
-/// gets, in the writer's thread: a network's sink, which must not block.
+/// Hears every message of [`messages`](crate::messages), and the frames of the bus
+/// ([`BUS_FRAMES`](crate::BUS_FRAMES)), with its time and the bytes that the file gets, in the
+/// writer's thread: a network's sink, which must not block.
 pub type Listener = Box<dyn FnMut(Time, &TopicMessage) + Send>;
 
 /// What a recording says about the bus that the truck is driven over.
@@ -106,7 +107,7 @@ impl Recording {
         let schedule = Schedule::new(&header.scenery.road);
         let mut trace = None;
         if let Some(bus) = header.bus {
-            let name = bus.vehicle.rsplit([':', '/']).next().unwrap_or_default().to_owned();
+            let name = bus_name(&bus.vehicle).unwrap_or_default().to_owned();
             let values = [("vehicle", bus.vehicle), (DRIVER_KEY, bus.driver_json)];
             let values = values.map(|(key, value)| (key.to_owned(), value));
             file.metadata(BUS_RECORD, BTreeMap::from(values))?;

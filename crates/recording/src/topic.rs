@@ -88,6 +88,8 @@ impl<M: Message> TopicOf<M> {
 /// Rates of what comes with every tick and with the scene, 1/s.
 const TICK_HZ: u16 = 100;
 const SCENE_HZ: u16 = 10;
+/// Frames of a bus of 250 kbit/s that is about half full, 1/s.
+const FRAMES_HZ: u16 = 1_000;
 
 /// Frames that do not change during a run.
 pub(crate) const STATIC_FRAMES: TopicOf<TfMessage> = TopicOf::latched("/tf_static");
@@ -110,8 +112,19 @@ pub(crate) const INPUT: TopicOf<StackInput> = TopicOf::new("/stack/input", TICK_
 /// Changes of the stack between two ticks.
 pub(crate) const CHANGES: TopicOf<StackChange> = TopicOf::new("/stack/change", 1);
 /// Of a drive over a bus; `BUS` stands for its name.
-pub(crate) const CAN_FRAMES: TopicOf<CanFrame> = TopicOf::new("/can/BUS/frames", TICK_HZ);
+pub(crate) const CAN_FRAMES: TopicOf<CanFrame> = TopicOf::new("/can/BUS/frames", FRAMES_HZ);
 pub(crate) const CAN_TICKS: TopicOf<BusTick> = TopicOf::new("/can/BUS/ticks", TICK_HZ);
+
+/// The frames of the bus that a truck is driven over. Its name has `BUS` where that of the bus
+/// belongs ([`bus_name`]).
+pub const BUS_FRAMES: Topic = CAN_FRAMES.topic;
+
+/// The name of the bus that `--vehicle` means: `can0` of `can:can0`; `None` of a truck that is driven
+/// directly.
+#[must_use]
+pub fn bus_name(vehicle: &str) -> Option<&str> {
+    (vehicle != "direct").then(|| vehicle.rsplit([':', '/']).next().unwrap_or_default())
+}
 
 /// Every topic, in the order in which a file opens them.
 pub const TOPICS: [Topic; 17] = [

@@ -145,6 +145,11 @@ impl Writer {
                     for call in &calls {
                         for message in call_messages(call)? {
                             self.file.write(call.now, &message)?;
+                            if let Some(listener) = &mut self.listener
+                                && message.topic == CAN_FRAMES.topic
+                            {
+                                listener(call.now, &message);
+                            }
                         }
                     }
                 }

@@ -4,7 +4,8 @@
 use std::path::Path;
 
 use ros2::definitions::{
-    AUTOWARE_CONTROL_MSGS, AUTOWARE_VEHICLE_MSGS, Definition, SIMULATION_INTERFACES, TF2_MSGS,
+    AUTOWARE_CONTROL_MSGS, AUTOWARE_VEHICLE_MSGS, CAN_MSGS, Definition, SIMULATION_INTERFACES,
+    TF2_MSGS,
 };
 
 fn main() -> std::io::Result<()> {
@@ -14,6 +15,7 @@ fn main() -> std::io::Result<()> {
     };
     let folder = Path::new(&folder);
     write(folder, "tf2_msgs", &["geometry_msgs"], TF2_MSGS)?;
+    write(folder, "can_msgs", &["std_msgs"], CAN_MSGS)?;
     let needs = ["builtin_interfaces", "std_msgs"];
     write(folder, "autoware_vehicle_msgs", &needs, AUTOWARE_VEHICLE_MSGS)?;
     write(folder, "autoware_control_msgs", &["builtin_interfaces"], AUTOWARE_CONTROL_MSGS)?;

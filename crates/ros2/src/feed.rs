@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use recording::{Listener, TOPICS, Topic, TopicMessage};
+use recording::{BUS_FRAMES, Listener, TOPICS, Topic, TopicMessage};
 
 /// Messages per second of wall time, as multiples of a topic's usual rate.
 const MAX_RATE: f64 = 10.0;
@@ -58,10 +58,14 @@ pub(crate) struct Outlet {
 /// A feed and its outlet.
 pub(crate) fn feed(now: Instant) -> (Feed, Outlet) {
     let full = |topic: Topic| BURST.max(f64::from(topic.usual_rate_hz));
-    let allowances =
-        TOPICS.map(|topic| Allowance { topic, messages: full(topic), at: now, held: None });
+    let allowances = TOPICS.into_iter().chain([BUS_FRAMES]).map(|topic| Allowance {
+        topic,
+        messages: full(topic),
+        at: now,
+        held: None,
+    });
     let (queue, queued) = sync_channel(QUEUE);
-    let allowances = Arc::new(Mutex::new(Vec::from(allowances)));
+    let allowances = Arc::new(Mutex::new(allowances.collect()));
     let feed = Feed { allowances, queue, dropped: Arc::default() };
     (feed.clone(), Outlet { feed, queued })
 }

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use futures::channel::oneshot;
 use futures::future::{LocalBoxFuture, join_all, select};
 use futures::{FutureExt, StreamExt};
-use recording::{Listener, TOPICS, Topic};
+use recording::{BUS_FRAMES, Listener, TOPICS, Topic};
 use ros2_client::action::ActionServerQosPolicies;
 use ros2_client::builtin_interfaces::Time;
 use ros2_client::dds::rustdds::{self, DomainParticipant};
@@ -53,14 +53,15 @@ pub struct Node {
 }
 
 impl Node {
-    /// Joins the domain as `/tractrix` and starts serving. Takes 1.2 s: another program's clock on
-    /// the domain must be noticed.
+    /// Joins the domain as `/tractrix` and starts serving, with the frames of the bus of this name if
+    /// there is one. Takes 1.2 s: another program's clock on the domain must be noticed.
     ///
     /// # Errors
     /// [`Ros2Error::ClockTaken`], or what the middleware says.
     pub fn start(
         network: Network,
         names: Names,
+        bus: Option<&str>,
         simulator: Arc<dyn Simulator>,
     ) -> Result<Self, Ros2Error> {
         let participant = network.join()?;
@@ -69,7 +70,7 @@ impl Node {
         let context = context.map_err(|e| network.failure("context", e))?;
         let mut setup = Setup::new(&context, network)?;
         let log = Arc::new(setup.node.logging_handle());
-        let publishers = setup.publishers()?;
+        let publishers = setup.publishers(bus)?;
         let autoware = (names == Names::Autoware).then(|| setup.autoware()).transpose()?;
         let loops = setup.loops(&simulator, &log)?;
         let (feed, outlet) = feed(wall_clock());
@@ -157,10 +158,17 @@ impl Setup {
         Ok(Self { node, network })
     }
 
-    /// A publisher for each topic of a recording that is not the stack's own.
-    fn publishers(&mut self) -> Result<Vec<(Topic, Publisher<Encoded>)>, Ros2Error> {
+    /// A publisher for each topic of a recording that is not the stack's own, and for the frames of
+    /// a bus.
+    fn publishers(
+        &mut self,
+        bus: Option<&str>,
+    ) -> Result<Vec<(Topic, Publisher<Encoded>)>, Ros2Error> {
         let topics = TOPICS.into_iter().filter(|t| !t.name.starts_with("/stack/"));
-        topics.map(|topic| Ok((topic, self.publisher(&topic)?))).collect()
+        let named = topics.map(|topic| (topic, topic.name.to_owned()));
+        let frames = bus.map(|bus| (BUS_FRAMES, frames_name(bus)));
+        let publish = |(topic, name): (Topic, String)| Ok((topic, self.publisher(&topic, &name)?));
+        named.chain(frames).map(publish).collect()
     }
 
     /// Publishers under Autoware's names.
@@ -190,7 +198,7 @@ impl Setup {
         publisher.map_err(|e| self.network.failure(name, e))
     }
 
-    fn publisher(&mut self, topic: &Topic) -> Result<Publisher<Encoded>, Ros2Error> {
+    fn publisher(&mut self, topic: &Topic, name: &str) -> Result<Publisher<Encoded>, Ros2Error> {
         let kind = topic.type_name.split_once("/msg/").unwrap_or_default();
         let reliable = QosProfile::publisher_default().reliability_reliable(WhenFull::Fail);
         let qos = match topic.is_latched {
@@ -199,9 +207,9 @@ impl Setup {
                 .history(History::KeepLast { depth: LATCHED_DEPTH }),
             false => reliable.history(History::KeepLast { depth: DEPTH }),
         };
-        let made = self.topic(topic.name, kind, &qos)?;
+        let made = self.topic(name, kind, &qos)?;
         let publisher = self.node.create_publisher(&made, None);
-        publisher.map_err(|e| self.network.failure(topic.name, e))
+        publisher.map_err(|e| self.network.failure(name, e))
     }
 
     fn topic(
@@ -324,6 +332,12 @@ impl Setup {
             .boxed_local()
         }))
     }
+}
+
+/// The topic of the frames of a bus: a name of ROS has letters, digits and underscores.
+fn frames_name(bus: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    format!("/can/{}/frames", bus.chars().map(plain).collect::<String>())
 }
 
 /// Carries out the commands of a topic; says on `/rosout` why not.

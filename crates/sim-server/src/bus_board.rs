@@ -2,10 +2,10 @@
 //! address, and what of the truck is not in order.
 
 use std::collections::BTreeMap;
+use std::convert::Infallible;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use j1939::bus::{Bus, BusError};
-use j1939::{Frame, GLOBAL_ADDRESS, Id, Name, TpEvent, Transport};
+use j1939::{Assembler, Frame, Id, Name};
 use sim::BusFigures;
 use tractrix_core::{BusRecorder, BusTrouble, RawFrame, Stamped, Time, VehicleStatus};
 
@@ -13,13 +13,9 @@ use tractrix_core::{BusRecorder, BusTrouble, RawFrame, Stamped, Time, VehicleSta
 const MOST_MESSAGES: usize = 512;
 /// Share of a new interval in the mean one.
 const NEW_SHARE: f64 = 0.1;
-/// Priority of a message that came in packets (SAE J1939-21).
-const PRIORITY: u8 = 7;
 /// Transport sessions at once, and the longest message (SAE J1939-21).
 const SESSIONS: usize = 8;
 const LONGEST: usize = 1785;
-/// Parameter groups of the transport protocol.
-const TRANSPORT: [u32; 2] = [0xEC00, 0xEB00];
 
 /// A message as it came or went last.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,7 +48,7 @@ pub(crate) struct Board {
     pub(crate) errors: u64,
     pub(crate) figures: Option<BusFigures>,
     pub(crate) status: VehicleStatus,
-    packets: Box<Transport<SESSIONS, LONGEST>>,
+    packets: Box<Assembler<SESSIONS, LONGEST>>,
 }
 
 impl Default for Board {
@@ -66,7 +62,7 @@ impl Default for Board {
             errors: 0,
             figures: None,
             status: VehicleStatus::default(),
-            packets: Box::new(Transport::listener()),
+            packets: Box::default(),
         }
     }
 }
@@ -97,23 +93,15 @@ impl Board {
             self.claims.insert(id.sa(), name);
         }
         self.take(is_sent, time, id, bytes);
-        if !TRANSPORT.contains(&id.pgn()) {
+        if !Assembler::<SESSIONS, LONGEST>::is_packet(id) {
             return;
         }
-        // A listener sends nothing, so that nothing can fail
-        let _ = self.packets.poll(time, &mut Nowhere);
-        self.packets.on_frame(time, &frame);
-        let _ = self.packets.poll(time, &mut Nowhere);
         let mut whole = Vec::new();
-        while let Some(event) = self.packets.event() {
-            let TpEvent::Received(message) = event else { continue };
-            let (pgn, sa) = (message.pgn, message.sa);
-            let id = Id::new(PRIORITY, pgn, message.da, sa)
-                .or_else(|_| Id::new(PRIORITY, pgn, GLOBAL_ADDRESS, sa));
-            if let Ok(id) = id {
-                whole.push((id, message.bytes.to_vec()));
-            }
-        }
+        let heard = self.packets.hear(time, &frame, &mut |message| {
+            whole.extend(message.map(|m| (m.id, m.bytes.to_vec())));
+            Ok::<(), Infallible>(())
+        });
+        let Ok(()) = heard;
         for (id, bytes) in whole {
             self.take(is_sent, time, id, &bytes);
         }
@@ -164,19 +152,6 @@ impl BusRecorder for BusBoard {
             None => board.frame(true, now, frame),
             Some(_) => board.errors += 1,
         }
-    }
-}
-
-/// The bus of who only listens.
-struct Nowhere;
-
-impl Bus for Nowhere {
-    fn send(&mut self, _: Time, _: &Frame) -> Result<(), BusError> {
-        Err(BusError::Off)
-    }
-
-    fn receive(&mut self, _: Time) -> Result<Option<Stamped<Frame>>, BusError> {
-        Ok(None)
     }
 }
 

@@ -18,6 +18,9 @@ pub(crate) struct Listeners {
 /// What is asked for.
 #[derive(Debug, Clone)]
 pub(crate) struct Wanted {
+    /// How the truck is reached, as `--vehicle` says.
+    #[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "the node's alone"))]
+    pub(crate) vehicle: String,
     /// A node of a ROS 2 domain.
     pub(crate) ros2: bool,
     /// Under Autoware's names too.
@@ -64,7 +67,7 @@ impl Listeners {
             #[cfg(feature = "ros2")]
             ros2: wanted
                 .ros2
-                .then(|| crate::ros2_node::start(session, wanted.with_autoware))
+                .then(|| crate::ros2_node::start(session, &wanted.vehicle, wanted.with_autoware))
                 .transpose()?,
             #[cfg(feature = "foxglove")]
             foxglove: wanted

@@ -14,16 +14,18 @@ use tractrix_core::{EgoState, Neighbour};
 use crate::failure::Failure;
 use crate::session::{Command, Handle, Refused, State};
 
-/// Starts the node of a session, in the domain that the environment says.
+/// Starts the node of a session whose truck is reached as `vehicle` says, in the domain that the
+/// environment says.
 ///
 /// # Errors
 /// [`Failure::Input`]: an environment variable, or a domain with a clock already.
 #[expect(clippy::disallowed_methods, reason = "ROS 2 is configured by the environment")]
-pub(crate) fn start(handle: &Handle, with_autoware: bool) -> Result<Node, Failure> {
+pub(crate) fn start(handle: &Handle, vehicle: &str, with_autoware: bool) -> Result<Node, Failure> {
     let network = Network::from_environment(|name| std::env::var(name).ok());
     let network = network.map_err(Failure::input)?;
     let names = if with_autoware { Names::Autoware } else { Names::Own };
-    Node::start(network, names, Arc::new(Session(handle.clone()))).map_err(Failure::input)
+    let (bus, session) = (recording::bus_name(vehicle), Arc::new(Session(handle.clone())));
+    Node::start(network, names, bus, session).map_err(Failure::input)
 }
 
 /// A session's door with the words of ROS 2.

@@ -139,6 +139,13 @@ pub const AUTOWARE_VEHICLE_MSGS: &[Definition] = &[
     ),
 ];
 
-/// Package `tf2_msgs`.
+/// Package `can_msgs`: what this node speaks of it.
+pub const CAN_MSGS: &[Definition] = &[(
+    "msg/Frame.msg",
+    "std_msgs/Header header\nuint32 id\nbool is_rtr\nbool is_extended\nbool is_error\nuint8 dlc\n\
+     uint8[8] data\n",
+)];
+
+/// Package `tf2_msgs`: what this node speaks of it.
 pub const TF2_MSGS: &[Definition] =
     &[("msg/TFMessage.msg", "geometry_msgs/TransformStamped[] transforms\n")];

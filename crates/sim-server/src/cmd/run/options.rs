@@ -33,6 +33,7 @@ pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
 /// The networks that the run is to be shown on.
 pub(super) fn networks(args: &Args) -> Wanted {
     Wanted {
+        vehicle: args.vehicle.clone(),
         ros2: args.ros2,
         with_autoware: matches!(args.ros2_names, Some(Names::Autoware)),
         foxglove: args.foxglove,
