@@ -9,7 +9,7 @@ use sim::SimError;
 
 use crate::fault::Fault;
 use crate::provenance;
-use crate::threads::Threads;
+use shell::Threads;
 
 /// The text of `diagnosis.json`; with `out`, also the files there.
 #[pyfunction]

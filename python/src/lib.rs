@@ -17,8 +17,6 @@ mod plan;
 mod policy;
 mod scenario;
 mod scene;
-#[path = "../../crates/sim-server/src/threads.rs"]
-mod threads;
 mod truck_model;
 mod world;
 
@@ -27,7 +25,7 @@ const fn provenance(seed: u64) -> tractrix_core::Provenance {
     tractrix_core::Provenance {
         schema: 1,
         version: env!("CARGO_PKG_VERSION"),
-        git_revision: env!("TRACTRIX_GIT_REVISION"),
+        git_revision: shell::GIT_REVISION,
         seed,
     }
 }
@@ -56,6 +54,6 @@ mod _native {
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyModuleMethods as _;
         module.add("VERSION", env!("CARGO_PKG_VERSION"))?;
-        module.add("GIT_REVISION", env!("TRACTRIX_GIT_REVISION"))
+        module.add("GIT_REVISION", shell::GIT_REVISION)
     }
 }

@@ -25,9 +25,10 @@ fn allowed() -> BTreeMap<&'static str, Vec<&'static str>> {
         ("ros2", vec!["recording"]),
         ("sim", plant.clone()),
         ("diagnosis", vec!["tractrix-core", "road", "dynamics", "tractrix-j1939"]),
+        ("shell", vec!["diagnosis"]),
         ("truck-node", vec!["tractrix-core", "road", "planner", "tractrix-j1939", "recording"]),
-        ("tractrix-python", [&plant[..], &["sim", "diagnosis"]].concat()),
-        ("sim-server", [plant, vec!["sim", "diagnosis", "recording", "ros2"]].concat()),
+        ("tractrix-python", [&plant[..], &["sim", "diagnosis", "shell"]].concat()),
+        ("sim-server", [plant, vec!["sim", "diagnosis", "shell", "recording", "ros2"]].concat()),
     ])
 }
 

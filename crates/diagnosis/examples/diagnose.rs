@@ -1,14 +1,11 @@
 //! Diagnoses a folder of drives: `diagnose DRIVES_DIR [BASELINE_DIR]`.
 #![expect(clippy::disallowed_macros, reason = "an example prints")]
 
-#[path = "../../sim-server/src/threads.rs"]
-mod threads;
-
 use std::path::Path;
 
 use diagnosis::{Options, Plant, diagnose, read_drives};
 use dynamics::TruckParameters;
-use threads::Threads;
+use shell::Threads;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

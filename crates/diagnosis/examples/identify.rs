@@ -9,15 +9,13 @@
 #[allow(dead_code, reason = "each user of the generator needs a part of it")]
 #[path = "../tests/support/mod.rs"]
 mod support;
-#[path = "../../sim-server/src/threads.rs"]
-mod threads;
 
 use std::collections::BTreeMap;
 
 use diagnosis::identify::identify;
+use shell::Threads;
 use support::nominal::{Off, off};
 use support::{Campaign, generate};
-use threads::Threads;
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();

@@ -25,7 +25,6 @@ mod ros2_node;
 mod run_folder;
 mod session;
 mod signals;
-mod threads;
 
 use std::process::ExitCode;
 

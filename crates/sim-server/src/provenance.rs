@@ -35,5 +35,4 @@ impl From<Provenance> for tractrix_core::Provenance {
 
 /// Version of the workspace.
 pub(crate) const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Git revision of the sources, `unknown` outside a repository.
-pub(crate) const GIT_REVISION: &str = env!("TRACTRIX_GIT_REVISION");
+pub(crate) use shell::GIT_REVISION;

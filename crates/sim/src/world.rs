@@ -387,8 +387,8 @@ pub fn stack_of(
 
 /// The trained policy that the program brings along (`policies/table2`).
 pub(crate) const BUILTIN_POLICY: &str = "builtin:table2";
-const BUILTIN_WEIGHTS: &[u8] = include_bytes!("../../../policies/table2.safetensors");
-const BUILTIN_SIDECAR: &str = include_str!("../../../policies/table2.json");
+const BUILTIN_WEIGHTS: &[u8] = include_bytes!("../policies/table2.safetensors");
+const BUILTIN_SIDECAR: &str = include_str!("../policies/table2.json");
 
 /// Weights of the learned decider, with the `.json` beside them, or `builtin:table2`.
 ///

@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::out_folder::{Out, OutFolder};
 use crate::output;
 use crate::progress::Stages;
-use crate::threads::Threads;
+use shell::Threads;
 
 mod example;
 pub(crate) mod folder;

@@ -15,7 +15,7 @@ use crate::out_folder::Out;
 use crate::output;
 use crate::progress::Stages;
 use crate::provenance::Provenance;
-use crate::threads::Threads;
+use shell::Threads;
 
 /// Manoeuvres that are listed beside the plan.
 const LISTED: usize = 5;

@@ -14,7 +14,7 @@ use crate::out_folder::Out;
 use crate::output;
 use crate::progress::Stages;
 use crate::provenance::{GIT_REVISION, Provenance, VERSION};
-use crate::threads::Threads;
+use shell::Threads;
 
 /// What is written, beside drives that are made.
 const RESULTS: &[&str] = &["identify.json", "*.identified.toml"];

@@ -15,7 +15,7 @@ use crate::output;
 use crate::picture::{Line, Strip, Style, page};
 use crate::progress::Stages;
 use crate::provenance::Provenance;
-use crate::threads::Threads;
+use shell::Threads;
 
 /// Drives the truck model with the measured inputs and compares its outputs with the measured
 /// ones. Writes fidelity.json and a picture, replay.html.

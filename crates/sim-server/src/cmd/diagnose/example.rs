@@ -20,7 +20,7 @@ use super::logger::drive;
 use crate::failure::Failure;
 use crate::out_folder::OutFolder;
 use crate::provenance::Provenance;
-use crate::threads::Threads;
+use shell::Threads;
 
 /// Truck of the example.
 pub(super) const TRUCK: &str = "reference";

@@ -1,5 +1,5 @@
-//! The jobs of a diagnosis on the machine's cores. The diagnosis itself starts no threads; its shells,
-//! the Python package among them, share this file.
+//! The jobs of a diagnosis on the machine's cores. The diagnosis itself starts no threads; its shells
+//! do.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -8,12 +8,12 @@ use diagnosis::Executor;
 
 /// As many threads as there are cores.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Threads(usize);
+pub struct Threads(usize);
 
 impl Threads {
     /// For this machine.
     #[must_use]
-    pub(crate) fn available() -> Self {
+    pub fn available() -> Self {
         Self(std::thread::available_parallelism().map_or(1, NonZeroUsize::get))
     }
 }
