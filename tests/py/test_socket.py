@@ -9,6 +9,7 @@ from playwright.sync_api import Page
 from running import running
 
 TALK = """async ([said, enough_ms, answers]) => {
+    const opens = performance.now();
     const socket = new WebSocket(`ws://${location.host}/ws`);
     const heard = [];
     socket.onmessage = (event) => heard.push([performance.now(), JSON.parse(event.data)]);
@@ -20,6 +21,7 @@ TALK = """async ([said, enough_ms, answers]) => {
         await new Promise((soon) => setTimeout(soon, 20));
     }
     socket.close();
+    heard.push([performance.now(), { kind: "listened", s: 1e-3 * (performance.now() - opens) }]);
     return heard;
 }"""
 
@@ -37,6 +39,11 @@ def kinds(heard: list[tuple[float, Any]], kind: str) -> list[Any]:
     return [message for _, message in heard if message["kind"] == kind]
 
 
+def most_frames(heard: list[tuple[float, Any]], rate_hz: float) -> float:
+    """What comes at that rate while was listened, which a busy machine draws out."""
+    return 1.25 * rate_hz * float(kinds(heard, "listened")[0]["s"]) + 4.0
+
+
 def test_a_viewer_is_greeted_chooses_its_channels_and_commands(
     server: Path, page: Page, tmp_path: Path
 ) -> None:
@@ -48,7 +55,7 @@ def test_a_viewer_is_greeted_chooses_its_channels_and_commands(
         hello = heard[0][1]
         assert (hello["kind"], hello["session"]) == ("hello", "default")
         assert hello["subscribed"] == ["frames", "strip", "events"]
-        assert 2 <= len(kinds(heard, "frame")) <= 20
+        assert 2 <= len(kinds(heard, "frame")) <= most_frames(heard, 20)
         first = kinds(heard, "events")[0]["events"][0]
         assert (first["number"], first["event"], first["seed"]) == (0, "run_began", 1)
 
@@ -58,7 +65,7 @@ def test_a_viewer_is_greeted_chooses_its_channels_and_commands(
         answers = {ack["id"]: ack for ack in kinds(heard, "ack")}
         assert answers["slow"]["subscribed"] == ["frames", "strip", "events"]
         assert answers[2]["subscribed"] == ["frames", "events"]
-        assert 2 <= len(kinds(heard, "frame")) <= 12
+        assert 2 <= len(kinds(heard, "frame")) <= most_frames(heard, 4)
         assert kinds(heard, "lost") == [], "what was not wanted is not lost"
 
         pause = {"action": "pause", "id": {"mine": 1}}
