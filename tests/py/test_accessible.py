@@ -44,6 +44,7 @@ FINDINGS = """() => {
     if (!t.textContent.trim() || !seen(e) || e.closest('script, style, svg, [disabled], [aria-disabled=true]')) continue;
     const [a, b] = [light(rgba(getComputedStyle(e).color)), light(behind(e))].sort((x, y) => y - x);
     const ratio = (a + 0.05) / (b + 0.05);
+    // WCAG 2.1, success criterion 1.4.3
     if (ratio < 4.5) found.push('contrast ' + ratio.toFixed(2) + ': ' + words(e));
   }
   return found;
@@ -65,3 +66,24 @@ def test_everything_has_a_name_contrast_and_a_place_in_the_order_of_keys(
     strict_page.goto(site.url + path)
     strict_page.wait_for_load_state("networkidle")
     assert strict_page.evaluate(FINDINGS) == []
+
+
+def test_what_a_page_may_not_have_is_found(site: Run, strict_page: Page) -> None:
+    strict_page.goto(site.url + "/runs")
+    strict_page.evaluate(
+        """() => {
+          const add = (kind, also) => document.querySelector('main').append(
+            Object.assign(document.createElement(kind), also));
+          add('button', {});
+          add('button', {textContent: 'Skipped', tabIndex: -1});
+          add('p', {id: 'twin'});
+          add('p', {id: 'twin', textContent: 'Pale'});
+          add('h1', {textContent: 'Another'});
+          const pale = document.getElementById('twin').nextElementSibling.style;
+          pale.color = '#999'; pale.backgroundColor = '#aaa';
+        }"""
+    )
+    found = [line.split(":")[0] for line in strict_page.evaluate(FINDINGS)]
+    assert found[:2] == ["two of id twin", "not one h1"]
+    assert found[2:4] == ["no name", "not by keyboard"]
+    assert [line.split()[0] for line in found[4:]] == ["contrast"]

@@ -4,7 +4,8 @@ import os
 import random
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import rclpy
@@ -118,6 +119,29 @@ class Peer:
 
     def step(self, steps: int) -> Any:
         return self.call(StepSimulation, "/step_simulation", steps=steps).result
+
+
+@contextmanager
+def running(*options: str) -> Iterator[subprocess.Popen[str]]:
+    """A run in real time with its node, killed at the end."""
+    process = program(*options, "--headless", "--pace", "realtime", "--ros2")
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@contextmanager
+def joined() -> Iterator[Peer]:
+    """A peer that hears the clock of the run."""
+    peer = Peer()
+    try:
+        peer.until(lambda: bool(peer.heard["/clock"]), "the clock", DISCOVERY_S)
+        yield peer
+    finally:
+        peer.node.destroy_node()
+        rclpy.shutdown()
 
 
 def program(*options: str) -> subprocess.Popen[str]:

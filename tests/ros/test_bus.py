@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import rclpy
 from can_msgs.msg import Frame
-from peers import DISCOVERY_S, RELIABLE, Peer, ns, program
+from peers import DISCOVERY_S, RELIABLE, Peer, joined, ns, running
 
 # EEC1 of the engine; TSC1 to it of the stack, which has address 0x27
 EEC1, TSC1_PGN, STACK = 0x0CF00400, 0x0000, 0x27
@@ -18,19 +17,14 @@ TICK_NS = 10_000_000
 
 @pytest.fixture
 def run(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    options = ["--vehicle", "bus", "--headless", "--pace", "realtime", "--ros2"]
-    process = program("flat", *options, "--out", str(tmp_path / "out"))
-    yield process
-    process.kill()
-    process.wait()
+    with running("flat", "--vehicle", "bus", "--out", str(tmp_path / "out")) as run:
+        yield run
 
 
 @pytest.fixture
 def peer(run: subprocess.Popen[str]) -> Iterator[Peer]:
-    peer = Peer()
-    yield peer
-    peer.node.destroy_node()
-    rclpy.shutdown()
+    with joined() as peer:
+        yield peer
 
 
 def pgn_and_source(identifier: int) -> tuple[int, int]:

@@ -6,28 +6,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import rclpy
 from autoware_control_msgs.msg import Control
-from peers import DISCOVERY_S, Peer, program
+from peers import DISCOVERY_S, Peer, joined, running
 from std_msgs.msg import Bool
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
-    options = ["--headless", "--pace", "realtime", "--ros2"]
-    process = program("flat", *options, "--out", str(tmp_path / "out"))
-    yield process
-    process.kill()
-    process.wait()
+    with running("flat", "--out", str(tmp_path / "out")) as run:
+        yield run
 
 
 @pytest.fixture
 def peer(run: subprocess.Popen[str]) -> Iterator[Peer]:
-    peer = Peer()
-    peer.until(lambda: bool(peer.heard["/clock"]), "the clock", DISCOVERY_S)
-    yield peer
-    peer.node.destroy_node()
-    rclpy.shutdown()
+    with joined() as peer:
+        yield peer
 
 
 def test_a_controller_drives_and_a_silent_one_stops_the_truck(peer: Peer) -> None:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import rclpy
 from action_msgs.msg import GoalStatus
 from autoware_vehicle_msgs.msg import (
     ControlModeReport,
@@ -22,7 +21,18 @@ from autoware_vehicle_msgs.msg import (
     VelocityReport,
 )
 from nav_msgs.msg import Odometry
-from peers import DISCOVERY_S, DOMAIN, RELIABLE, SERVER, TOPICS, Peer, ns, program
+from peers import (
+    DISCOVERY_S,
+    DOMAIN,
+    RELIABLE,
+    SERVER,
+    TOPICS,
+    Peer,
+    joined,
+    ns,
+    program,
+    running,
+)
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -60,21 +70,15 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def run(folder: Path) -> Iterator[subprocess.Popen[str]]:
-    options = ["--headless", "--pace", "realtime", "--decider", "external"]
-    options += ["--ros2", "--ros2-names", "autoware"]
-    process = program("highway", *options, "--out", str(folder))
-    yield process
-    process.kill()
-    process.wait()
+    options = ["--decider", "external", "--ros2-names", "autoware"]
+    with running("highway", *options, "--out", str(folder)) as run:
+        yield run
 
 
 @pytest.fixture(scope="module")
 def peer(run: subprocess.Popen[str]) -> Iterator[Peer]:
-    peer = Peer()
-    peer.until(lambda: bool(peer.heard["/clock"]), "the clock", DISCOVERY_S)
-    yield peer
-    peer.node.destroy_node()
-    rclpy.shutdown()
+    with joined() as peer:
+        yield peer
 
 
 def test_every_topic_is_heard_with_one_type(peer: Peer) -> None:

@@ -5,9 +5,10 @@ use tractrix_core::{Stamped, Time};
 use crate::bus::{Bus, BusError};
 use crate::{Frame, GLOBAL_ADDRESS, Id, TpEvent, Transport};
 
-/// Groups of the transport protocols (TP.CM, TP.DT, ETP.CM, ETP.DT): they carry others.
+/// Groups of the transport protocols (TP.CM, TP.DT, ETP.CM, ETP.DT; SAE J1939-21): they carry others.
 const TRANSPORT: [u32; 4] = [0xEC00, 0xEB00, 0xC800, 0xC700];
-/// Priority of a transported message, which its packets do not tell.
+/// Priority of a transported message, which its packets do not tell: the default of what informs
+/// (SAE J1939-21).
 const PRIORITY: u8 = 6;
 
 /// A message out of many frames.
