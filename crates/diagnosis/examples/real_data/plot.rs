@@ -11,7 +11,7 @@ pub(crate) struct Panel<'a> {
     pub(crate) series: Vec<Series<'a>>,
 }
 
-/// Points in order.
+/// Points in order; without a name they belong to the series before them.
 pub(crate) struct Series<'a> {
     pub(crate) name: &'a str,
     pub(crate) points: Vec<(f64, f64)>,
@@ -96,8 +96,19 @@ fn draw(svg: &mut String, panel: &Panel<'_>, top: f64) {
         "<text x='14' y='{middle}' text-anchor='middle' transform='rotate(-90 14 {middle})'>{}</text>",
         panel.y
     ));
-    for (i, s) in panel.series.iter().enumerate() {
-        let colour = COLOURS[i % COLOURS.len()];
+    // Names stand in the right corner that holds less
+    let right = |upper: bool| {
+        all().filter(|p| p.0 > 0.5 * (x0 + x1) && (p.1 > 0.5 * (y0 + y1)) == upper).count()
+    };
+    let named = panel.series.iter().filter(|s| !s.name.is_empty()).count();
+    let first =
+        if right(true) > right(false) { bottom - 15.0 * named as f64 + 8.0 } else { top + 14.0 };
+    let mut names = 0;
+    for s in &panel.series {
+        if !s.name.is_empty() {
+            names += 1;
+        }
+        let colour = COLOURS[(names.max(1) - 1) % COLOURS.len()];
         let mut path = String::new();
         if s.line {
             for (x, y) in &s.points {
@@ -115,11 +126,13 @@ fn draw(svg: &mut String, panel: &Panel<'_>, top: f64) {
                 ));
             }
         }
-        let x = WIDTH - 12.0;
-        put(format!(
-            "<text x='{x}' y='{}' text-anchor='end' fill='{colour}'>{}</text>",
-            top + 14.0 + 15.0 * i as f64,
-            s.name
-        ));
+        if !s.name.is_empty() {
+            put(format!(
+                "<text x='{}' y='{}' text-anchor='end' fill='{colour}'>{}</text>",
+                WIDTH - 12.0,
+                first + 15.0 * (names - 1) as f64,
+                s.name
+            ));
+        }
     }
 }
