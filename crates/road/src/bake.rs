@@ -29,6 +29,29 @@ pub(crate) struct Cell {
     u: [f64; 5],
     /// Coefficients of t..t⁵ to its left.
     v: [f64; 5],
+    /// The cell is nowhere more curved than this, 1/m.
+    pub(crate) curved_at_most_1_m: f64,
+}
+
+/// Nowhere between 0 and `h` is the derivative of `c[0] t + .. + c[4] t⁵` farther from `c[0]` than
+/// this, nor the second derivative from zero than that.
+fn bounds(c: &[f64; 5], h: f64) -> (f64, f64) {
+    let [c1, c2, c3, c4] = [c[1], c[2], c[3], c[4]].map(libm::fabs);
+    let off = h * (2.0 * c1 + h * (3.0 * c2 + h * (4.0 * c3 + h * 5.0 * c4)));
+    (off, 2.0 * c1 + h * (6.0 * c2 + h * (12.0 * c3 + h * 20.0 * c4)))
+}
+
+/// A bound of the curvature `(u' v'' - v' u'')/|r'|³` over the cell, 1/m, by bounds of its terms;
+/// infinite where they say nothing.
+fn curved_at_most_1_m(u: &[f64; 5], v: &[f64; 5], h: f64) -> f64 {
+    let ((off_u, second_u), (off_v, second_v)) = (bounds(u, h), bounds(v, h));
+    let (first_u, first_v) = (libm::fabs(u[0]) + off_u, libm::fabs(v[0]) + off_v);
+    let least = libm::fabs(u[0]) - off_u;
+    if !(least > 0.5) {
+        return f64::INFINITY;
+    }
+    // a little more than enough, for what rounding takes
+    1.000_001 * (first_u * second_v + first_v * second_u) / (least * least * least)
 }
 
 impl Cell {
@@ -87,7 +110,9 @@ impl Cell {
             ]
         };
         let [x_m, y_m] = a.point;
-        Self { s_m, length_m, x_m, y_m, heading_rad, cos, sin, u: axis(0), v: axis(1) }
+        let (u, v) = (axis(0), axis(1));
+        let curved_at_most_1_m = curved_at_most_1_m(&u, &v, h);
+        Self { s_m, length_m, x_m, y_m, heading_rad, cos, sin, u, v, curved_at_most_1_m }
     }
 }
 

@@ -179,6 +179,18 @@ impl Line {
         (s, cell.local(s - cell.s_m).curvature_1_m())
     }
 
+    /// A bound of the curvature between two stations, 1/m: nowhere there is [`Line::curvature_1_m`]
+    /// larger, to either side. Infinite on curves that are bent within metres.
+    #[must_use]
+    pub fn curved_at_most_1_m(&self, from_m: f64, to_m: f64) -> f64 {
+        let first = self.cell(from_m.clamp(0.0, self.length_m));
+        let mut most_1_m = self.cells[first].curved_at_most_1_m;
+        for cell in self.cells[first + 1..].iter().take_while(|cell| cell.s_m <= to_m) {
+            most_1_m = most_1_m.max(cell.curved_at_most_1_m);
+        }
+        most_1_m
+    }
+
     /// The height alone, m: as [`Line::at`] at a part of its cost.
     #[must_use]
     pub fn height_m(&self, s_m: f64) -> f64 {

@@ -296,6 +296,19 @@ impl Road {
             .unwrap_or_else(|| self.speed_limit_m_s(s_m))
     }
 
+    /// The speed limit of a lane between two stations, m/s, where it is one all the way.
+    #[must_use]
+    pub fn even_lane_speed_limit_m_s(&self, lane: u16, from_m: f64, to_m: f64) -> Option<f64> {
+        let changes = |limits: &[(f64, f64)]| {
+            let first = limits.partition_point(|l| l.0 <= from_m);
+            limits.get(first).is_some_and(|l| l.0 <= to_m)
+        };
+        let own = self.lanes.get(usize::from(lane)).map_or(&[][..], |l| &l.speed_limits);
+        let changes = changes(own) || own.is_empty() && changes(&self.limits);
+        let before_its_own = !own.is_empty() && own[0].0 > from_m;
+        (!changes && !before_its_own).then(|| self.lane_speed_limit_m_s(lane, from_m))
+    }
+
     /// Fills `out` with the profile from `s0_m` on, `step_m` apart; clamped at the end.
     pub fn profile(&self, s0_m: f64, step_m: f64, out: &mut [ProfilePoint]) {
         for (i, p) in out.iter_mut().enumerate() {

@@ -92,6 +92,35 @@ proptest! {
 }
 
 #[test]
+fn bounds_of_a_stretch_hold_at_every_point_of_it_and_are_near_to_it() {
+    for road in ROADS.iter() {
+        let line = road.line();
+        let (mut known, mut stretches) = (0, 0);
+        for from_m in (0..).map(|i| 83.7 * f64::from(i)).take_while(|&s| s < road.length_m()) {
+            let to_m = from_m + 600.0;
+            let points = (0..=6_000).map(|k| from_m + 0.1 * f64::from(k));
+            let most_1_m =
+                points.clone().map(|s| line.curvature_1_m(s).1.abs()).fold(0.0, f64::max);
+            let bound_1_m = line.curved_at_most_1_m(from_m, to_m);
+            assert!(most_1_m <= bound_1_m, "{most_1_m} above {bound_1_m} from {from_m} m");
+            stretches += 1;
+            // The cells at both ends reach 25 m beyond the stretch.
+            let beyond = (-250..=6_250).map(|k| from_m + 0.1 * f64::from(k));
+            let near_1_m = beyond.map(|s| line.curvature_1_m(s).1.abs()).fold(1e-6, f64::max);
+            known += u32::from(bound_1_m < 1.5 * near_1_m);
+            for lane in 0..road.lanes().len() as u16 {
+                let even = road.even_lane_speed_limit_m_s(lane, from_m, to_m);
+                let limits = points.clone().step_by(7).map(|s| road.lane_speed_limit_m_s(lane, s));
+                let first_m_s = road.lane_speed_limit_m_s(lane, from_m);
+                let is_even = limits.clone().all(|limit| limit == first_m_s);
+                assert!(even.is_none_or(|m_s| m_s == first_m_s && is_even), "lane {lane}");
+            }
+        }
+        assert!(2 * known > stretches, "{}: near for {known} of {stretches}", road.name());
+    }
+}
+
+#[test]
 fn stations_beyond_the_ends_are_clamped_and_far_points_have_no_position() {
     let road = builtin::flat(1_000.0);
     assert_eq!(road.at(-50.0, 1.0), road.at(0.0, 1.0));

@@ -30,6 +30,19 @@ pub(crate) struct SpeedBounds {
     pub curve_accel_m_s2: f64,
 }
 
+impl SpeedBounds {
+    /// What limits and curves allow, m/s, where it is one limit all the way that no curve is known
+    /// to undercut: most of a highway, at a part of the cost of looking at every point.
+    fn even_m_s(&self, road: &Road, lane: u16, from_m: f64, to_m: f64) -> Option<f64> {
+        let [from_m, to_m] = [from_m, to_m].map(|s_m| s_m.clamp(0.0, road.length_m()));
+        let limit_m_s = road.even_lane_speed_limit_m_s(lane, from_m, to_m)?;
+        let curved_1_m = road.line().curved_at_most_1_m(from_m, to_m).max(1e-6);
+        let holds =
+            self.obey_speed_limits && self.curve_accel_m_s2 / curved_1_m >= limit_m_s * limit_m_s;
+        holds.then_some(limit_m_s)
+    }
+}
+
 /// Speed reference from a station on.
 #[derive(Debug)]
 pub(crate) struct ReferenceSpeed {
@@ -57,7 +70,7 @@ impl Clone for ReferenceSpeed {
 
 impl ReferenceSpeed {
     /// Recomputes the reference from `s_m` on, in `lane`. `planned` is the predictive planner's
-    /// speed at a station where it has one; it replaces the set speed.
+    /// speed at a station where it has one, which replaces the set speed; `None` if it plans nothing.
     pub(crate) fn update(
         &mut self,
         road: &Road,
@@ -65,7 +78,7 @@ impl ReferenceSpeed {
         s_m: f64,
         geometry: &Geometry,
         bounds: &SpeedBounds,
-        planned: impl Fn(f64) -> Option<f64>,
+        planned: Option<&dyn Fn(f64) -> Option<f64>>,
     ) {
         let behind = libm::ceil(geometry.length_m() / STEP_M).clamp(0.0, LONGEST as f64) as usize;
         let first_m = s_m - behind as f64 * STEP_M;
@@ -80,20 +93,40 @@ impl ReferenceSpeed {
             // the root is taken only where the curve is what bounds
             if curve_2 >= limit * limit { limit } else { libm::sqrt(curve_2) }
         };
-        let mut caps_m_s = [f64::INFINITY; POINTS + LONGEST];
-        for (k, cap_m_s) in caps_m_s.iter_mut().enumerate().take(POINTS + behind) {
-            *cap_m_s = cap(k);
-        }
         let lane_end_m = road
             .lanes()
             .get(usize::from(lane))
             .filter(|l| l.end != LaneEnd::Continues)
             .map_or(f64::INFINITY, |l| l.s_end_m - geometry.front_m - STOP_BEFORE_END_M);
-        for (i, allowed) in self.held_m_s.iter_mut().enumerate() {
-            let held = caps_m_s[i..=i + behind].iter().copied().fold(f64::INFINITY, f64::min);
-            *allowed = if s_m + (i as f64) * STEP_M < lane_end_m { held } else { 0.0 };
+        let last_m = s_m + (POINTS - 1) as f64 * STEP_M;
+        // a step farther, so that no rounding of stations leaves it
+        if let Some(limit_m_s) = bounds.even_m_s(road, lane, first_m, last_m + STEP_M)
+            && last_m < lane_end_m
+        {
+            self.held_m_s = [limit_m_s; POINTS];
+            if planned.is_none() {
+                return self.hold(s_m, bounds.set_speed_m_s.min(limit_m_s));
+            }
+        } else {
+            let mut caps_m_s = [f64::INFINITY; POINTS + LONGEST];
+            for (k, cap_m_s) in caps_m_s.iter_mut().enumerate().take(POINTS + behind) {
+                *cap_m_s = cap(k);
+            }
+            for (i, allowed) in self.held_m_s.iter_mut().enumerate() {
+                let held = caps_m_s[i..=i + behind].iter().copied().fold(f64::INFINITY, f64::min);
+                *allowed = if s_m + (i as f64) * STEP_M < lane_end_m { held } else { 0.0 };
+            }
         }
-        self.rise(s_m, |s| planned(s).unwrap_or(bounds.set_speed_m_s));
+        self.rise(s_m, |s| planned.and_then(|p| p(s)).unwrap_or(bounds.set_speed_m_s));
+    }
+
+    /// One speed all the way.
+    fn hold(&mut self, s_m: f64, speed_m_s: f64) {
+        self.points.clear();
+        self.points.extend((0..POINTS).map(|i| {
+            let s_m = s_m + i as f64 * STEP_M;
+            SpeedPoint { s_m, speed_m_s, accel_m_s2: 0.0 }
+        }));
     }
 
     /// Recomputes the reference from what limits, curves and the lane's end allow another one, with
@@ -157,7 +190,7 @@ mod tests {
     /// plan of 12 m/s makes of its reference.
     fn wish(road: &Road, lane: u16, s_m: f64, bounds: &SpeedBounds) -> ReferenceSpeed {
         let mut planned = ReferenceSpeed::default();
-        planned.update(road, lane, s_m, &reference_geometry(), bounds, |_| Some(12.0));
+        planned.update(road, lane, s_m, &reference_geometry(), bounds, Some(&|_| Some(12.0)));
         let mut wish = ReferenceSpeed::default();
         wish.update_like(&planned, bounds.set_speed_m_s);
         wish
@@ -206,6 +239,51 @@ mod tests {
             }
         }
         assert!(by_set_speed > 10 && by_limit > 10 && by_curve > 10);
+    }
+
+    #[test]
+    fn an_even_stretch_gives_what_looking_at_every_point_gives() {
+        // The shortcut for even stretches must not change a bit.
+        let road = builtin::highway();
+        let (mut even, mut uneven) = (0, 0);
+        for (curve_accel_m_s2, obey_speed_limits) in [(1.5, true), (0.3, true), (1.5, false)] {
+            let bounds = SpeedBounds { set_speed_m_s: 30.0, obey_speed_limits, curve_accel_m_s2 };
+            for s_m in (0..1480).map(|i| 10.123 * f64::from(i)) {
+                let mut reference = ReferenceSpeed::default();
+                reference.update(&road, 0, s_m, &reference_geometry(), &bounds, None);
+                let behind = (reference_geometry().length_m() / STEP_M).ceil();
+                let is_even = bounds
+                    .even_m_s(&road, 0, s_m - behind * STEP_M, s_m + POINTS as f64 * STEP_M)
+                    .is_some();
+                if is_even {
+                    even += 1
+                } else {
+                    uneven += 1
+                }
+                // every point by itself, as the doc of the module has it
+                let mut by_points = [0.0; POINTS];
+                for (i, speed_m_s) in by_points.iter_mut().enumerate() {
+                    *speed_m_s = bounds.set_speed_m_s;
+                    for k in 0..=behind as i32 {
+                        let at_m = s_m - behind * STEP_M + (i as f64 + f64::from(k)) * STEP_M;
+                        let (at_m, bend_1_m) = road.line().curvature_1_m(at_m);
+                        let curve_m_s = (curve_accel_m_s2 / bend_1_m.abs().max(1e-6)).sqrt();
+                        let limit_m_s = road.lane_speed_limit_m_s(0, at_m);
+                        let limit_m_s = if obey_speed_limits { limit_m_s } else { f64::INFINITY };
+                        *speed_m_s = speed_m_s.min(curve_m_s).min(limit_m_s);
+                    }
+                }
+                for i in (0..POINTS - 1).rev() {
+                    let ahead = by_points[i + 1];
+                    let reached = (ahead * ahead + 2.0 * APPROACH_DECEL_M_S2 * STEP_M).sqrt();
+                    by_points[i] = by_points[i].min(reached);
+                }
+                for (point, speed_m_s) in reference.points().iter().zip(by_points) {
+                    assert_eq!(point.speed_m_s.to_bits(), speed_m_s.to_bits(), "at {s_m} m");
+                }
+            }
+        }
+        assert!(even > 500 && uneven > 500, "{even} {uneven}");
     }
 
     #[test]

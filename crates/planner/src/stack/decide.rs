@@ -1,6 +1,7 @@
 //! The decision of a tick: what is wished, why, and whether it is driven.
 
 use super::tactics::Tactics;
+use crate::Situation;
 use crate::decider::observation::{
     self, ObservationSpec, Observed, Observer, PROFILE_S, Seen, sees_anyone,
 };
@@ -10,7 +11,6 @@ use crate::decider::{
 };
 use crate::speed::power_reserve_w;
 use crate::steering::{ManeuverPlanner, Outlook};
-use crate::{Situation, stack::grade};
 use tractrix_core::{LaneChangeReason, LaneChangeRefusal, Maneuver};
 
 /// Headway that a return to the right lane leaves a follower under MOBIL, s.
@@ -222,7 +222,7 @@ impl Tactics {
             ],
             wish_speed_m_s: view.wish_speed_m_s,
             mass_kg: at.limits.road_load.mass_kg,
-            power_reserve_w: power_reserve_w(at.limits, ego, grade(at.road, ego, at.limits)),
+            power_reserve_w: power_reserve_w(at.limits, ego, at.grade_rad()),
             profile_m_s,
         }
     }

@@ -33,6 +33,7 @@ use alloc::vec::Vec;
 use crate::decider::{DeciderKind, LaneChoice, Policy};
 use crate::pcc::horizon::{HorizonFailure, HorizonPlan};
 use crate::safety::{GuardInput, GuardMemory, Inputs, inspect, limit};
+use crate::situation::grade_rad;
 use crate::speed::{LoadEstimate, LoadEstimator};
 use crate::steering::LateralPath;
 use crate::{PlannerError, Situation};
@@ -284,7 +285,7 @@ impl Stack {
         if !self.config().estimator.enabled {
             return;
         }
-        self.estimator.update(dt_s, ego, grade(road, ego, limits), limits);
+        self.estimator.update(dt_s, ego, grade_rad(road, ego, limits), limits);
         if !self.ticks.is_multiple_of(u64::from(self.config().rates.decision_ticks)) {
             return;
         }
@@ -348,15 +349,6 @@ impl Stack {
         e.s_m += e.speed_m_s * dt_s;
         e.yaw_rad += road.line().at(e.s_m).heading_rad - before;
     }
-}
-
-/// Mean grade under the combination, rad.
-fn grade(road: &Road, ego: &EgoState, limits: &VehicleLimits) -> f64 {
-    let g = &limits.geometry;
-    let length = g.length_m().max(1.0);
-    let front = road.line().height_m(ego.s_m + g.front_m);
-    let rear = road.line().height_m(ego.s_m - g.rear_m());
-    libm::atan((front - rear) / length)
 }
 
 fn publish_path(out: &mut Vec<PathPoint>, path: &LateralPath, road: &Road, ego: &EgoState) {

@@ -1,6 +1,6 @@
 //! Demands of who drives in the stack's place: an external controller.
 
-use super::{Stack, grade};
+use super::Stack;
 use crate::Situation;
 use crate::speed::SpeedTarget;
 use serde::{Deserialize, Serialize};
@@ -34,7 +34,7 @@ impl Stack {
             accel_m_s2: demand.accel_m_s2,
             traffic_accel_m_s2: held_back.map_or(asked_m_s2, |(_, f)| f.accel_m_s2),
             haste: held_back.map_or(f64::INFINITY, |(_, f)| f.haste),
-            grade_rad: grade(at.road, at.ego, at.limits),
+            grade_rad: at.grade_rad(),
             ..SpeedTarget::default()
         };
         let config = self.tactics.config();

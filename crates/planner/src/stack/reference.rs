@@ -82,6 +82,8 @@ impl Tactics {
             Some(speed) => speed.at(s_m).map(|p| p.speed_m_s),
             None => profile.and_then(|p| p.at(s_m)),
         };
+        let planned: Option<&dyn Fn(f64) -> Option<f64>> =
+            if ahead.is_some() || profile.is_some() { Some(&planned) } else { None };
         self.reference.update(at.road, lane, s_m, &at.limits.geometry, &bounds, planned);
         if self.may_overspeed() || self.plans_ahead() {
             let over_m_s = if self.may_overspeed() { self.config.overspeed_m_s } else { 0.0 };

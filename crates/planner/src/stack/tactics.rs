@@ -4,7 +4,7 @@
 use alloc::sync::Arc;
 
 use super::speed::SpeedPlanning;
-use super::{SpeedPlannerKind, StackConfig, grade};
+use super::{SpeedPlannerKind, StackConfig};
 use crate::decider::observation::Observer;
 use crate::decider::{DeciderKind, LaneChoice, Policy, Scratch, lane_ends_in_m};
 use crate::safety::Headway;
@@ -286,7 +286,7 @@ impl Tactics {
     fn drive(&mut self, at: &Situation<'_>, maneuver: &ManeuverPlanner) -> Option<TacticalPlan> {
         let ego = at.ego;
         let (reference_m_s, reference_accel) = self.reference.at(ego.s_m)?;
-        let grade_rad = grade(at.road, ego, at.limits);
+        let grade_rad = at.grade_rad();
         let leads = leads(&self.lead_view(at), maneuver);
         let response = self.config.rss.ego_response(at.limits);
         let following = self.follow(&leads, &response, ego.speed_m_s, grade_rad);
@@ -350,7 +350,7 @@ impl Tactics {
     pub(super) fn following_of_others(&self, at: &Situation<'_>) -> Option<(u64, Following)> {
         let leads = leads(&self.lead_view(at), &self.joining(at)?);
         let response = self.config.rss.ego_response(at.limits);
-        self.follow(&leads, &response, at.ego.speed_m_s, grade(at.road, at.ego, at.limits))
+        self.follow(&leads, &response, at.ego.speed_m_s, at.grade_rad())
     }
 
     fn headway_on(&self, maneuver: &ManeuverPlanner, at: &Situation<'_>) -> Option<Headway> {
@@ -365,9 +365,7 @@ impl Tactics {
     /// What a change is planned with; `None` before the first tick.
     pub(super) fn outlook<'a>(&self, at: &'a Situation<'a>) -> Option<Outlook<'a>> {
         let (reference_speed_m_s, _) = self.reference.at(at.ego.s_m)?;
-        let grade_rad = grade(at.road, at.ego, at.limits);
-        let grade_rad = grade_rad.min(steepest_descent(at.road, at.ego.s_m));
-        Some(Outlook { at, reference_speed_m_s, grade_rad })
+        Some(Outlook { at, reference_speed_m_s })
     }
 
     pub(super) fn lead_view<'a>(&'a self, at: &Situation<'a>) -> LeadView<'a> {
@@ -394,10 +392,4 @@ fn join_from(road: &Road, lane: u16, ego: &EgoState) -> LateralPath {
         Lateral { d_m: ego.d_m, slope: libm::tan(heading.clamp(-0.5, 0.5)), second_1_m: 0.0 };
     let length_m = JOIN_S * ego.speed_m_s.max(5.0);
     LateralPath::join(road, lane, here, ego.s_m, length_m)
-}
-
-/// The steepest descent within the stopping distance ahead, rad, not above zero.
-fn steepest_descent(road: &Road, s_m: f64) -> f64 {
-    let slopes = (0..8).map(|i| road.line().slope(s_m + 25.0 * f64::from(i)));
-    libm::atan(slopes.fold(0.0, f64::min))
 }

@@ -310,9 +310,22 @@ impl Courses {
 
     /// The courses, cheapest first; of equally dear ones the one that was added first.
     fn cheapest_first(&mut self) -> impl Iterator<Item = SpeedCourse> + '_ {
+        type Entry = (f64, usize, SpeedCourse);
+        let order = |a: &Entry, b: &Entry| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
         let list = &mut self.list[..self.count];
-        list.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        list.iter().map(|(_, _, course)| *course)
+        if let Some(first) = (0..list.len()).min_by(|&i, &j| order(&list[i], &list[j])) {
+            list.swap(0, first);
+        }
+        // The first one often serves: the others are put in order when they are asked for.
+        let mut next = 0;
+        core::iter::from_fn(move || {
+            if next == 1 {
+                list[1..].sort_unstable_by(order);
+            }
+            let (_, _, course) = list.get(next)?;
+            next += 1;
+            Some(*course)
+        })
     }
 }
 

@@ -39,8 +39,6 @@ pub(crate) struct Outlook<'a> {
     pub at: &'a Situation<'a>,
     /// Reference speed, m/s.
     pub reference_speed_m_s: f64,
-    /// Steepest descent ahead, rad (uphill positive).
-    pub grade_rad: f64,
 }
 
 /// The manoeuvre and its path.
@@ -226,7 +224,7 @@ impl ManeuverPlanner {
 
     fn gate(&self, out: &Outlook<'_>, own: u16, target: u16) -> Gate {
         let Situation { ego, scene, road, limits, .. } = *out.at;
-        let (rss, grade_rad) = (&self.rss, out.grade_rad);
+        let (rss, grade_rad) = (&self.rss, out.at.descent_rad());
         Gate::new(&GateView { rss, ego, scene, road, limits, grade_rad }, own, target)
     }
 

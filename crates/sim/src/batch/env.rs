@@ -191,10 +191,7 @@ impl Shared {
             let warmed = NativeTraffic::with_map(traffic.map(), road, geometry, with(seed))?;
             pool.push(warmed.snapshot());
         }
-        let ego = *truck.state();
-        let road = Arc::clone(&self.road);
-        let now = tractrix_core::Time::ZERO;
-        Ok((Kinematic { road, limits, traffic, tactics, ego, now }, pool))
+        Ok((Kinematic::new(Arc::clone(&self.road), limits, traffic, tactics), pool))
     }
 
     /// The truck so far behind the scenario's start, m.

@@ -29,6 +29,10 @@ pub(super) struct Kinematic {
     pub(super) tactics: Tactics,
     pub(super) ego: EgoState,
     pub(super) now: Time,
+    /// Grade at the ego, rad.
+    grade_rad: f64,
+    /// Power at the wheels at full load, W.
+    at_wheels_w: f64,
 }
 
 impl Clone for Kinematic {
@@ -43,19 +47,33 @@ impl Clone for Kinematic {
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { road, limits, traffic, tactics, ego, now } = from;
+        let Self { road, limits, traffic, tactics, ego, now, grade_rad, at_wheels_w } = from;
         self.road.clone_from(road);
         self.limits.clone_from(limits);
         self.traffic.clone_from(traffic);
         self.tactics.clone_from(tactics);
         (self.ego, self.now) = (*ego, *now);
+        (self.grade_rad, self.at_wheels_w) = (*grade_rad, *at_wheels_w);
     }
 }
 
 impl Kinematic {
+    /// A truck that stands ready at the road's start.
+    pub(super) fn new(
+        road: Arc<Road>,
+        limits: Arc<VehicleLimits>,
+        traffic: NativeTraffic,
+        tactics: Tactics,
+    ) -> Self {
+        let at_wheels_w = at_wheels_w(&limits);
+        let (ego, now) = (EgoState::default(), Time::ZERO);
+        Self { road, limits, traffic, tactics, ego, now, grade_rad: 0.0, at_wheels_w }
+    }
+
     /// Starts here and looks around.
     pub(super) fn begin(&mut self, ego: EgoState) -> Result<(), SimError> {
         (self.ego, self.now) = (ego, Time::ZERO);
+        self.grade_rad = self.road.at(ego.s_m, ego.d_m).grade_rad;
         self.look()
     }
 
@@ -98,6 +116,7 @@ impl Kinematic {
         let lateral = plan.path.at(&self.road, s_m);
         let (angle_rad, curvature_1_m) = plan.path.direction(&self.road, s_m);
         let at = self.road.at(s_m, lateral.d_m);
+        self.grade_rad = at.grade_rad;
         let e = &mut self.ego;
         (e.x_m, e.y_m, e.z_m) = (at.x_m, at.y_m, at.z_m);
         (e.s_m, e.d_m, e.yaw_rad) = (s_m, lateral.d_m, at.heading_rad + angle_rad);
@@ -112,12 +131,7 @@ impl Kinematic {
 
     /// The acceleration that full power gives on this grade, m/s².
     fn most_accel_m_s2(&self) -> f64 {
-        let powertrain = &self.limits.powertrain;
-        let full = &powertrain.full_load_nm;
-        let power_w = full.x().iter().zip(full.y()).map(|(w, m)| w * m).fold(0.0, f64::max);
-        let efficiency = powertrain.gear_efficiency_frac.last().copied().unwrap_or(1.0);
-        let at_wheels_w = (power_w - powertrain.auxiliary_power_w) * efficiency;
-        let grade_rad = self.road.at(self.ego.s_m, self.ego.d_m).grade_rad;
+        let grade_rad = self.grade_rad;
         let piece = RoadPiece {
             sin_grade: libm::sin(grade_rad),
             cos_grade: libm::cos(grade_rad),
@@ -125,8 +139,17 @@ impl Kinematic {
         };
         let v = self.ego.speed_m_s;
         let load = &self.limits.road_load;
-        (at_wheels_w / v.max(POWER_FROM_M_S) - load.resistance_n(v, &piece)) / load.mass_kg
+        (self.at_wheels_w / v.max(POWER_FROM_M_S) - load.resistance_n(v, &piece)) / load.mass_kg
     }
+}
+
+/// Power at the wheels at full load, W.
+fn at_wheels_w(limits: &VehicleLimits) -> f64 {
+    let powertrain = &limits.powertrain;
+    let full = &powertrain.full_load_nm;
+    let power_w = full.x().iter().zip(full.y()).map(|(w, m)| w * m).fold(0.0, f64::max);
+    let efficiency = powertrain.gear_efficiency_frac.last().copied().unwrap_or(1.0);
+    (power_w - powertrain.auxiliary_power_w) * efficiency
 }
 
 fn situation<'a>(

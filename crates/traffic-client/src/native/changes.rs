@@ -305,32 +305,6 @@ impl Engine {
         }
         let frac =
             |i: usize| desire.map_or(fleet.mind[i].headway_frac, |d| self.content_frac(i, d));
-        let (new_before, new_after) = match follower {
-            NOBODY => (0.0, 0.0),
-            EGO => (0.0, self.ego_behind_m_s2(i, lane)),
-            f => {
-                let (f, before) = (f as usize, self.raw_a_m_s2[f as usize]);
-                let after = self.in_lane_m_s2(f, i as u32, lane, frac(f));
-                (before, after.min(before))
-            }
-        };
-        let (old_before, old_after) = match self.near.follower[i][OWN] {
-            NOBODY | EGO => (0.0, 0.0),
-            o => {
-                let (o, before) = (o as usize, self.raw_a_m_s2[o as usize]);
-                let ahead = self.near.leader[i][OWN];
-                let after = self.in_lane_m_s2(o, ahead, fleet.lane[i], fleet.mind[o].headway_frac);
-                (before, after.max(before))
-            }
-        };
-        let change = Change {
-            own_before_m_s2: self.raw_a_m_s2[i],
-            own_after_m_s2: self.in_lane_m_s2(i, leader, lane, frac(i)),
-            new_follower_before_m_s2: new_before,
-            new_follower_after_m_s2: new_after,
-            old_follower_before_m_s2: old_before,
-            old_follower_after_m_s2: old_after,
-        };
         let class = self.class(i);
         let mobil = Mobil {
             politeness_frac: fleet.driver[i].politeness_frac,
@@ -338,6 +312,38 @@ impl Engine {
             threshold_m_s2: class.threshold_m_s2,
             right_bias_m_s2: class.right_bias_m_s2,
         };
+        let pays = |c: &Change| desire.is_some() || mobil.incentive_m_s2(c, side == RIGHT) > 0.0;
+        let mut change = Change {
+            own_before_m_s2: self.raw_a_m_s2[i],
+            own_after_m_s2: self.in_lane_m_s2(i, leader, lane, frac(i)),
+            ..Change::default()
+        };
+        // Most changes do not pay even if nobody minds and whoever is behind gains all there is to
+        // gain: what the others would do is worked out only where it may matter.
+        if let o @ ..EGO = self.near.follower[i][OWN] {
+            let (o, before) = (o as usize, self.raw_a_m_s2[o as usize]);
+            change.old_follower_before_m_s2 = before;
+            change.old_follower_after_m_s2 = before.max(fleet.driver[o].idm.accel_m_s2);
+            if !pays(&change) {
+                return None;
+            }
+            let ahead = self.near.leader[i][OWN];
+            let after = self.in_lane_m_s2(o, ahead, fleet.lane[i], fleet.mind[o].headway_frac);
+            change.old_follower_after_m_s2 = after.max(before);
+        }
+        if !pays(&change) {
+            return None;
+        }
+        match follower {
+            NOBODY => {}
+            EGO => change.new_follower_after_m_s2 = self.ego_behind_m_s2(i, lane),
+            f => {
+                let (f, before) = (f as usize, self.raw_a_m_s2[f as usize]);
+                let after = self.in_lane_m_s2(f, i as u32, lane, frac(f));
+                change.new_follower_before_m_s2 = before;
+                change.new_follower_after_m_s2 = after.min(before);
+            }
+        }
         mobil.is_safe(&change).then(|| (lane, mobil.incentive_m_s2(&change, side == RIGHT)))
     }
 
