@@ -113,7 +113,7 @@ impl Control {
         let step_m = ego.speed_m_s.max(LOWEST_SPEED_M_S) * PREVIEW_STEP_S;
         let mut curvature = [0.0; PREVIEW_POINTS];
         for (i, k) in curvature.iter_mut().enumerate() {
-            *k = path.direction(road, ego.s_m + i as f64 * step_m).1;
+            *k = path.curvature_1_m(road, ego.s_m + i as f64 * step_m);
         }
         (error, self.lateral.step(ego, error, &curvature, limits))
     }

@@ -245,7 +245,7 @@ impl Stack {
             self.tactics.release();
             None
         };
-        let curvature = road.line().at(ego.s_m).curvature_1_m;
+        let (_, curvature) = road.line().curvature_1_m(ego.s_m);
         let lateral = &self.control.lateral;
         let steady =
             lateral.steady_road_wheel_rad(curvature, ego.speed_m_s, limits.road_load.mass_kg);

@@ -155,8 +155,13 @@ impl LateralPath {
     /// Heading relative to the road and map curvature at a station: (rad, 1/m).
     #[must_use]
     pub fn direction(&self, road: &Road, s_m: f64) -> (f64, f64) {
-        let k_r = road.line().at(s_m).curvature_1_m;
-        direction(&self.at(road, s_m), k_r)
+        direction(&self.at(road, s_m), road.line().curvature_1_m(s_m).1)
+    }
+
+    /// Map curvature alone at a station, 1/m: that of [`Self::direction`].
+    #[must_use]
+    pub(crate) fn curvature_1_m(&self, road: &Road, s_m: f64) -> f64 {
+        bend(&self.at(road, s_m), road.line().curvature_1_m(s_m).1).1
     }
 
     /// The path as a map point, `time_s` from now.
@@ -180,13 +185,19 @@ impl LateralPath {
 /// Heading relative to the road, rad, and map curvature, 1/m, of a lateral course.
 #[must_use]
 pub(super) fn direction(lateral: &Lateral, road_curvature_1_m: f64) -> (f64, f64) {
+    let (tan, curvature_1_m) = bend(lateral, road_curvature_1_m);
+    (libm::atan(tan), curvature_1_m)
+}
+
+/// Tangent of the heading relative to the road, and map curvature, 1/m.
+fn bend(lateral: &Lateral, road_curvature_1_m: f64) -> (f64, f64) {
     let k_r = road_curvature_1_m;
     let stretch = (1.0 - k_r * lateral.d_m).max(0.05);
     let tan = lateral.slope / stretch;
     let cos2 = 1.0 / (1.0 + tan * tan);
     let cos = libm::sqrt(cos2);
     let bend = (lateral.second_1_m + k_r * lateral.slope * tan) * cos2 / stretch + k_r;
-    (libm::atan(tan), bend * cos / stretch)
+    (tan, bend * cos / stretch)
 }
 
 #[cfg(test)]
