@@ -136,7 +136,7 @@ impl Batch {
                 let usual = of(scenario, fidelity);
                 let window = window_m.map_or(usual.window, |(behind_m, ahead_m)| {
                     let whole = behind_m == f64::INFINITY && ahead_m == f64::INFINITY;
-                    (!whole).then_some(WindowConfig { behind_m, ahead_m })
+                    (!whole).then_some(WindowConfig { behind_m, ahead_m, awake_m: None })
                 });
                 Ok(EnvSpec { episode_s, start_spread_m, window, ..usual })
             });

@@ -1,11 +1,12 @@
 //! Steps of environments per CPU second on one thread.
 //!
-//! `cargo run --release -p sim --example batch_speed -- [SCENARIO] [kinematic|truck] [ENVIRONMENTS] [DECISIONS]`
+//! `cargo run --release -p sim --example batch_speed -- [SCENARIO] [kinematic|truck] [ENVIRONMENTS] [DECISIONS] [AWAKE_M]`
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program that measures may stop")]
 
 use rustix::time::{ClockId, clock_gettime};
 use sim::Scenario;
 use sim::batch::{Batch, EnvSnapshot, EnvSpec, EpisodeStats, Fidelity, SUBSTEP_S, Views};
+use traffic_client::native::WindowConfig;
 
 /// CPU time of this thread, s.
 fn cpu_s() -> f64 {
@@ -22,7 +23,9 @@ fn main() {
     };
     let count: usize = args.next().map_or(64, |n| n.parse().unwrap());
     let decisions: usize = args.next().map_or(120, |n| n.parse().unwrap());
-    let spec = EnvSpec::new(Scenario::named(&name).unwrap(), fidelity);
+    let mut spec = EnvSpec::new(Scenario::named(&name).unwrap(), fidelity);
+    let awake_m: Option<f64> = args.next().map(|m| m.parse().unwrap());
+    spec.window = spec.window.map(|window| WindowConfig { awake_m, ..window });
     let per_decision = (spec.decision_s / SUBSTEP_S).round();
     let mut batch = Batch::new(vec![spec; count], 1, 1).unwrap();
     let size = batch.observation_size();

@@ -1,6 +1,6 @@
 //! How far traffic with a window is that of the whole road.
 //!
-//! `cargo run --release -p traffic-client --example window -- [SEEDS] [SECONDS] [FAMILY]`
+//! `cargo run --release -p traffic-client --example window -- [SEEDS] [SECONDS] [FAMILY] [AWAKE_M]`
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program that measures may stop")]
 
 mod measure;
@@ -13,14 +13,17 @@ fn main() {
     let seeds: u64 = args.next().map_or(20, |n| n.parse().unwrap());
     let duration_s: f64 = args.next().map_or(600.0, |n| n.parse().unwrap());
     let only = args.next();
+    let awake_m = args.next().map(|m| m.parse().unwrap());
+    let near = WindowConfig { awake_m, ..WindowConfig::default() };
     println!(
         "| family | whole: 1/km, m/s, delta | window | difference | KS (95 % of chance) | least gap |"
     );
-    for family in families().iter().filter(|f| only.as_ref().is_none_or(|o| o == f.name)) {
+    for family in families().iter().filter(|f| only.as_ref().is_none_or(|o| f.name.starts_with(o)))
+    {
         let runs = |window: Option<WindowConfig>| -> Vec<Run> {
             (0..seeds).map(|seed| run(family, window, seed, duration_s)).collect()
         };
-        let (whole, window) = (runs(None), runs(Some(WindowConfig::default())));
+        let (whole, window) = (runs(None), runs(Some(near)));
         let mean = |runs: &[Run], of: fn(&Run) -> f64| {
             runs.iter().map(of).sum::<f64>() / runs.len() as f64
         };

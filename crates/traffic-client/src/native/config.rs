@@ -327,6 +327,10 @@ impl TrafficConfig {
             let radius_m = self.scene_radius_m;
             check("window.behind_m".to_owned(), window.behind_m, radius_m, 100_000.0);
             check("window.ahead_m".to_owned(), window.ahead_m, radius_m, 100_000.0);
+            if let Some(awake_m) = window.awake_m {
+                let least_m = window.behind_m.max(window.ahead_m);
+                check("window.awake_m".to_owned(), awake_m, least_m, 100_000.0);
+            }
         }
         for (key, value, low, high) in self.human.ranges() {
             check(key.to_owned(), value, low, high);

@@ -173,13 +173,13 @@ type Chunk<'a> = (
 
 /// What moving a piece gave.
 #[derive(Debug, Clone, Copy, Default)]
-struct Moved {
-    driven_m: f64,
-    somebody_leaves: bool,
+pub(super) struct Moved {
+    pub(super) driven_m: f64,
+    pub(super) somebody_leaves: bool,
 }
 
 impl Moved {
-    fn and(self, other: Self) -> Self {
+    pub(super) fn and(self, other: Self) -> Self {
         Self {
             driven_m: self.driven_m + other.driven_m,
             somebody_leaves: self.somebody_leaves || other.somebody_leaves,
@@ -188,7 +188,7 @@ impl Moved {
 }
 
 /// Has the vehicle left the road?
-fn is_out(map: &LaneMap, s_m: f64, lane: u16, driver: &Driver) -> bool {
+pub(super) fn is_out(map: &LaneMap, s_m: f64, lane: u16, driver: &Driver) -> bool {
     let lane = &map.lanes[lane as usize];
     let left_road = s_m - driver.length_m > map.s_end_m || s_m > driver.leaves_s_m;
     left_road || lane.leaves && s_m > lane.s_end_m
@@ -239,8 +239,8 @@ impl Engine {
         let mut raw = std::mem::take(&mut self.raw_a_m_s2);
         self.state.fleet.fit(&mut raw, 0.0);
         // Who does not act goes on as before.
-        let present = self.present();
-        for i in (present.start..acting.start).chain(acting.end..present.end) {
+        let looked_at = self.looked_at(&acting);
+        for i in (looked_at.start..acting.start).chain(acting.end..looked_at.end) {
             raw[i] = self.state.fleet.a_m_s2[i];
         }
         let first = acting.start;
@@ -293,8 +293,7 @@ impl Engine {
 
     fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize, acting: Range<usize>) {
         let (fleet, map, tick) = (&self.state.fleet, &*self.map, self.state.tick);
-        let (near, present) = (self.near(), self.present());
-        let range = if acting == near { present } else { acting };
+        let (near, range) = (self.near(), self.looked_at(&acting));
         let eventful = !self.blocks.is_empty() || !self.rushing.is_empty();
         let looks_aside = |i: usize| {
             is_due(tick, fleet.id[i])
@@ -315,9 +314,10 @@ impl Engine {
         let mut moved = self.move_on(present.clone(), Stride::TICK);
         if is_for_all && self.state.near.is_some() {
             ticks = FAR_TICKS;
-            moved = moved.and(self.move_on(0..present.start, Stride::FAR));
-            let ahead = present.end..self.state.fleet.len();
-            moved = moved.and(self.move_on(ahead, Stride::FAR));
+            let awake = self.awake();
+            moved = moved.and(self.move_on(awake.start..present.start, Stride::FAR));
+            moved = moved.and(self.move_on(present.end..awake.end, Stride::FAR));
+            moved = moved.and(self.move_asleep(awake));
         }
         self.state.driven_m += moved.driven_m;
         self.state.tick += 1;

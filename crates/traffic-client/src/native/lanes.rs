@@ -209,6 +209,17 @@ impl LaneMap {
         Self { lanes, exits, s_start_m, s_end_m, sin_grade, ends_early, left_of_three }
     }
 
+    /// Is the road the same all along: no lane begins or ends, one limit for each, one grade?
+    pub(crate) fn is_even(&self) -> bool {
+        let whole = |lane: &Lane| {
+            lane.usage == LaneUse::Closed
+                || lane.sections.len() == 1
+                    && lane.s_start_m < self.s_start_m + 1.0
+                    && lane.s_end_m > self.s_end_m - 1.0
+        };
+        self.lanes.iter().all(whole) && self.sin_grade.windows(2).all(|w| w[0] == w[1])
+    }
+
     /// Is it the leftmost of three or more lanes?
     pub(crate) fn is_left_of_three(&self, lane: u16) -> bool {
         self.left_of_three[lane as usize]

@@ -1,6 +1,7 @@
 //! Native traffic: IDM car following, MOBIL lane changes, inflow, ramps, grades, the ego seen by
 //! lateral overlap.
 mod accelerations;
+mod asleep;
 mod boundary;
 mod changes;
 mod config;

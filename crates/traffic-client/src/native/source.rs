@@ -101,6 +101,11 @@ impl NativeTraffic {
     ) -> Result<Self, TrafficError> {
         config.validate()?;
         config.schedule.validate(Some(&road))?;
+        if config.window.is_some_and(|window| window.awake_m.is_some()) && !map.is_even() {
+            let why =
+                format!("window.awake_m: not on {}, which is not the same all along", road.name());
+            return Err(TrafficError::Config { why });
+        }
         let warm_up = (config.warm_up_s / TICK_S) as u64;
         let mut engine = Engine::new(Arc::new(config), map);
         engine.fill();

@@ -6,6 +6,8 @@
 //! window has come about in traffic, congestion too, and nothing has to be put in at its edges.
 //! A few vehicles next to the window are moved with it, so that those at its edge see whom they
 //! follow. Who is in the window is settled whenever all act; it holds until then.
+//!
+//! On request those far away do not act at all ([`WindowConfig::awake_m`], [`super::asleep`]).
 
 use std::ops::Range;
 
@@ -26,12 +28,17 @@ pub struct WindowConfig {
     pub behind_m: f64,
     /// So far ahead of it, m; at least the radius of scenes.
     pub ahead_m: f64,
+    /// Farther than this from it, either way, vehicles drive on at the speed that they have, m; at
+    /// least as far as the window. `None`: they act everywhere. Only on a road that is the same all
+    /// along, and in free traffic: a queue does not go on growing there.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub awake_m: Option<f64>,
 }
 
 impl Default for WindowConfig {
     /// The radius of scenes behind, and room for the leaders of those in it ahead.
     fn default() -> Self {
-        Self { behind_m: 300.0, ahead_m: 400.0 }
+        Self { behind_m: 300.0, ahead_m: 400.0, awake_m: None }
     }
 }
 
@@ -42,6 +49,8 @@ pub(crate) struct Near {
     acts: (usize, usize),
     /// The same of those that are moved: a few more on both sides.
     moves: (usize, usize),
+    /// The same of those that act at all.
+    awake: (usize, usize),
     /// The tick in which all act again.
     until: u64,
 }
@@ -70,15 +79,39 @@ impl Engine {
             return near.acts.0..near.acts.1;
         }
         let s_m = &self.state.fleet.s_m;
-        let first = s_m.partition_point(|&s| s < ego_s_m - window.behind_m);
-        let end = s_m.partition_point(|&s| s <= ego_s_m + window.ahead_m);
-        let more = (2 * self.map.lanes.len()).clamp(4, 12);
+        let within = |behind_m: f64, ahead_m: f64| {
+            let first = s_m.partition_point(|&s| s < ego_s_m - behind_m);
+            first..s_m.partition_point(|&s| s <= ego_s_m + ahead_m)
+        };
+        let near = within(window.behind_m, window.ahead_m);
+        let moves = self.and_a_few_more(near.clone());
+        let awake = window.awake_m.map_or(all, |awake_m| {
+            let awake = within(awake_m, awake_m);
+            awake.start.min(moves.start)..awake.end.max(moves.end)
+        });
         self.state.near = Some(Near {
-            acts: (first, end),
-            moves: (first.saturating_sub(more), (end + more).min(all.end)),
+            acts: (near.start, near.end),
+            moves: (moves.start, moves.end),
+            awake: (awake.start, awake.end),
             until: self.state.tick + FAR_TICKS,
         });
-        all
+        awake
+    }
+
+    /// A range with those next to it, whom who is in it follows.
+    fn and_a_few_more(&self, range: Range<usize>) -> Range<usize> {
+        let more = (2 * self.map.lanes.len()).clamp(4, 12);
+        range.start.saturating_sub(more)..(range.end + more).min(self.state.fleet.len())
+    }
+
+    /// Those that who acts looks at.
+    pub(super) fn looked_at(&self, acting: &Range<usize>) -> Range<usize> {
+        if *acting == self.near() { self.present() } else { self.and_a_few_more(acting.clone()) }
+    }
+
+    /// Those that act, some of them less often.
+    pub(super) fn awake(&self) -> Range<usize> {
+        self.state.near.map_or(0..self.state.fleet.len(), |near| near.awake.0..near.awake.1)
     }
 
     /// Those that act at the full rate.
