@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,23 @@ def test_one_seed_gives_one_network_on_any_threads_and_after_a_stop(
     assert weights(other) != weights(whole)
     with pytest.raises(ValueError, match="trained otherwise"):
         Training(small(seed=2), tmp_path / "parts", resume=True)
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("ray") is None, reason="Ray is not installed"
+)
+def test_actors_of_a_cluster_give_the_network_of_one_process(tmp_path: Path) -> None:
+    import ray
+
+    whole = Training(small(), tmp_path / "whole")
+    whole.run()
+    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+    try:
+        shared = Training(small(), tmp_path / "shared", actors=2)
+        shared.run()
+    finally:
+        ray.shutdown()
+    assert weights(shared) == weights(whole)
 
 
 def test_a_minute_of_training_beats_keep_and_random_changes(tmp_path: Path) -> None:
