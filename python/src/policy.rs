@@ -15,8 +15,7 @@ const SPECS: [(&str, ObservationSpec); 2] =
 
 fn named(spec: &str) -> Result<ObservationSpec, Fault> {
     let known = SPECS.iter().find(|(word, _)| *word == spec);
-    let (_, of) =
-        known.ok_or_else(|| Fault::Value(format!("spec = {spec:?}: ours or paper")))?;
+    let (_, of) = known.ok_or_else(|| Fault::Value(format!("spec = {spec:?}: ours or paper")))?;
     Ok(*of)
 }
 

@@ -31,9 +31,10 @@ from tractrix.evaluate.drive import TABLE2, drive
 from tractrix.train._command import command
 from tractrix.train.asking import Asking, Draws, Team
 from tractrix.train.export import encoded, export
-from tractrix.train.network import QNetwork
+from tractrix.train.network import ACTIONS, QNetwork
 
 Array = npt.NDArray[Any]
+KEEP = ACTIONS.index("keep")
 VALIDATION_SEED = 1_000_000
 """First seed of the validation; those of the training are 64 random bits."""
 
@@ -70,6 +71,10 @@ class Settings:
     """States in an update."""
     learning_rate: float = 1e-3
     """Adam's step at the beginning of a round; it falls to a twentieth on a cosine."""
+    change_cost_s: float = 0.0
+    """What a change has to gain beside its cost in the reward, s. The network that decides in the
+    rollouts has learned it too: a margin on its values alone would put changes off for ever, as to
+    change a second later is worth almost as much."""
     most_s: float = 3.0
     """Advantages are cut here, s: how bad the worst change is does not matter."""
     validate_every: int = 10
@@ -157,9 +162,9 @@ class Training:
         share = np.bincount(self.scenario, minlength=len(settings.scenarios)) / count
         weight = 1.0 / (share[self.scenario] * np.count_nonzero(share))
         obs, known = torch.from_numpy(self.obs), torch.from_numpy(~np.isnan(self.worth))
-        wanted = torch.from_numpy(
-            np.nan_to_num(self.worth).clip(-settings.most_s, settings.most_s)
-        )
+        cost_s = settings.change_cost_s * (np.arange(len(ACTIONS)) != KEEP)
+        worth = np.nan_to_num(self.worth) - cost_s.astype(np.float32)
+        wanted = torch.from_numpy(worth.clip(-settings.most_s, settings.most_s))
         weights = torch.from_numpy(weight.astype(np.float32))[:, None] * known
         adam = torch.optim.Adam(self.network.parameters(), settings.learning_rate)
         updates = settings.epochs * -(-count // settings.batch)
@@ -196,8 +201,9 @@ class Training:
             f"valid_{name}": float(figures[name].mean())
             for name in ("reward_s", "delta_speed_frac", "lane_changes", "collided")
         }
-        if found["valid_reward_s"] > self.best:
-            self.best = found["valid_reward_s"]
+        changes_s = settings.change_cost_s * found["valid_lane_changes"]
+        if found["valid_reward_s"] - changes_s > self.best:
+            self.best = found["valid_reward_s"] - changes_s
             export(
                 self.network,
                 self.out / "policy.safetensors",
