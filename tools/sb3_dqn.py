@@ -123,7 +123,7 @@ def main() -> None:
         training={"trainer": "stable-baselines3 DQN", "settings": settings},
         evaluation={},
     )
-    print(f"{given.steps * UPDATES_PER_STEP} updates, {cpu_s:.0f} CPU s")
+    print(f"{model._n_updates} updates, {cpu_s:.0f} CPU s")
 
 
 if __name__ == "__main__":

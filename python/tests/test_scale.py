@@ -111,3 +111,22 @@ def test_a_sweep_gives_the_figures_of_one_process(tmp_path: Path) -> None:
         assert ours["seed"].tolist() == list(range(1, 31))
         for name, values in theirs.items():
             np.testing.assert_array_equal(ours[name], values)
+
+
+def test_rllib_trains_an_iteration_on_the_registered_environment() -> None:
+    pytest.importorskip(
+        "ray.rllib.algorithms.dqn", reason="RLlib is not installed: ray[rllib]"
+    )
+    from ray.rllib.algorithms.dqn import DQNConfig
+    from tractrix.train import rllib
+
+    rllib.register()
+    config = DQNConfig().framework("torch").env_runners(num_env_runners=1)
+    config.environment(rllib.NAME, env_config={"scenario": "table2-sparse-15"})
+    config.training(num_steps_sampled_before_learning_starts=20, train_batch_size=16)
+    config.reporting(min_sample_timesteps_per_iteration=60, min_time_s_per_iteration=0)
+    algorithm = config.build_algo()
+    result = algorithm.train()
+    algorithm.stop()
+    assert result["training_iteration"] == 1
+    assert result["num_env_steps_sampled_lifetime"] >= 60
