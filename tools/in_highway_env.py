@@ -24,7 +24,7 @@ import numpy.typing as npt
 import tractrix
 from highway_env.vehicle.behavior import IDMVehicle
 from highway_env.vehicle.kinematics import Vehicle
-from tractrix.evaluate.statistics import LEAST_PAIRS, paired
+from transfer_table import FIGURES, tell
 
 TRUCK = Path(__file__).parents[1] / "crates" / "dynamics" / "trucks" / "longhaul.toml"
 STEP_S = 0.1
@@ -36,7 +36,6 @@ WISHES_M_S = (9.5, 12.5)
 """Of the cars; the truck wishes 16.67 m/s."""
 SPACING = 2.0
 """Of highway-env's `create_random`: 20 cars on about 0.5 km."""
-FIGURES = ("delta_speed_frac", "lane_changes", "collisions", "distance_m")
 
 
 def body_m() -> tuple[float, float]:
@@ -150,7 +149,7 @@ class Coupled:
 
 
 def main() -> None:
-    """Prints a row per decider, with the paired difference to the first."""
+    """Drives every decider through the same seeds."""
     parser = argparse.ArgumentParser(
         formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
@@ -160,22 +159,12 @@ def main() -> None:
     parser.add_argument("--duration-s", type=float, default=200.0, help=" ")
     given = parser.parse_args()
     seeds = range(given.first_seed, given.first_seed + given.seeds)
-    reference: npt.NDArray[np.float64] | None = None
-    for word in given.deciders:
-        rows = [Coupled(word, seed, given.duration_s).drive() for seed in seeds]
-        found = {name: np.array([row[name] for row in rows]) for name in FIGURES}
-        delta = 100.0 * found["delta_speed_frac"]
-        text = f"{word}: delta speed {delta.mean():.2f} %"
-        if reference is not None and len(seeds) >= LEAST_PAIRS:
-            low, high = paired(delta, reference).t
-            text += f" ({low:+.2f} to {high:+.2f} against {given.deciders[0]})"
-        reference = delta if reference is None else reference
-        print(
-            f"{text}, {found['lane_changes'].mean():.2f} changes, "
-            f"{found['collisions'].sum():.0f} collisions "
-            f"in {found['distance_m'].sum() / 1000:.1f} km",
-            flush=True,
-        )
+    tell(
+        {
+            word: [Coupled(word, seed, given.duration_s).drive() for seed in seeds]
+            for word in given.deciders
+        }
+    )
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import tractrix
-from tractrix.evaluate.statistics import LEAST_PAIRS, paired
+from transfer_table import FIGURES, tell
 
 TICKS = 10
 """Of 0.01 s between two scenes."""
@@ -27,7 +27,6 @@ FRONT_M, LENGTH_M = 5.3, 17.0
 """The truck's front ahead of its reference point, and its length with a little room."""
 SLOWEST_M_S = 3.0
 """Who hardly moves is no place to start."""
-FIGURES = ("delta_speed_frac", "lane_changes", "collisions", "distance_m")
 
 
 def scenario(file: str, lanes: int, source: str, **ego: float) -> dict[str, Any]:
@@ -95,7 +94,7 @@ def drive(
 
 
 def main() -> None:
-    """Prints a row per decider, with the paired difference to the first."""
+    """Drives every decider from every start."""
     parser = argparse.ArgumentParser(
         formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
@@ -110,20 +109,7 @@ def main() -> None:
         for start in starts(scenes[0], length_m, given.most):
             for word, found in rows.items():
                 found.append(drive(file, given.lanes, scenes, start, word))
-    reference: npt.NDArray[np.float64] | None = None
-    for word, all_ in rows.items():
-        found = {name: np.array([row[name] for row in all_]) for name in FIGURES}
-        delta = 100.0 * found["delta_speed_frac"]
-        text = f"{word}: {len(all_)} starts, delta speed {delta.mean():.2f} %"
-        if reference is not None and len(all_) >= LEAST_PAIRS:
-            low, high = paired(delta, reference).t
-            text += f" ({low:+.2f} to {high:+.2f} against {given.deciders[0]})"
-        reference = delta if reference is None else reference
-        print(
-            f"{text}, {found['lane_changes'].mean():.2f} changes, "
-            f"{np.count_nonzero(found['collisions'])} with a contact, "
-            f"{found['distance_m'].sum() / 1000:.1f} km"
-        )
+    tell(rows)
 
 
 if __name__ == "__main__":

@@ -202,7 +202,7 @@ def test_vehicles_that_another_simulator_moves_are_driven_among() -> None:
         theirs.show(ours.scene())
         theirs.step()
     assert theirs.ego == ours.ego and len(theirs.scene()) > 2
-    assert theirs.decision.following is not None
+    assert theirs.decision is not None and theirs.decision.following is not None
     state = theirs.summary()["state_hash"]
     assert state == ours.summary()["state_hash"]
     fork = theirs.snapshot()
@@ -228,7 +228,7 @@ def test_vehicles_that_another_simulator_moves_are_driven_among() -> None:
         with pytest.raises(ValueError, match=named):
             theirs.show(wrong)
     with pytest.raises(ValueError, match="SCENE_DTYPE"):
-        theirs.show(np.zeros(3))
+        theirs.show(np.zeros(3))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="without traffic"):
         ours.show(shown)
 
