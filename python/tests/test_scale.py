@@ -40,6 +40,7 @@ def asking() -> Asking:
         explore_frac=0.15,
         horizon_s=20.0,
         discount_frac_s=0.99,
+        change_cost_s=0.25,
     )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tractrix._cluster import ATTEMPTS, ray_module
-from tractrix._policy import Policy
+from tractrix._policy import SHIPPED, Policy
 from tractrix._vector_env import VectorEnv
 
 Array = npt.NDArray[Any]
@@ -49,6 +49,8 @@ class Asking:
     """Length of a rollout, s."""
     discount_frac_s: float
     """What is left of a reward's worth after a second."""
+    change_cost_s: float
+    """What a change costs in the reward, s."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -90,6 +92,7 @@ class Asker:
             count,
             [asking.scenarios[kind] for kind in self.scenario],
             episode_s=asking.episode_s,
+            change_cost_s=asking.change_cost_s,
             threads=threads,
         )
 
@@ -102,7 +105,10 @@ class Asker:
         """
         with tempfile.TemporaryDirectory() as folder:
             if former is None:
-                return self._drive(draws, self.asking.first_base, None)
+                base = self.asking.first_base
+                word, _, named = base.partition(":")
+                policy = Policy(named or SHIPPED) if word == "dqn" else None
+                return self._drive(draws, base, policy)
             file = Path(folder) / "former.safetensors"
             file.write_bytes(former[0])
             file.with_suffix(".json").write_text(former[1])

@@ -31,10 +31,9 @@ from tractrix.evaluate.drive import TABLE2, drive
 from tractrix.train._command import command
 from tractrix.train.asking import Asking, Draws, Team
 from tractrix.train.export import encoded, export
-from tractrix.train.network import ACTIONS, QNetwork
+from tractrix.train.network import QNetwork
 
 Array = npt.NDArray[Any]
-KEEP = ACTIONS.index("keep")
 VALIDATION_SEED = 1_000_000
 """First seed of the validation; those of the training are 64 random bits."""
 
@@ -50,7 +49,8 @@ class Settings:
     rounds: int = 5
     """Rounds: drive and ask, then fit."""
     first_base: str = "mobil"
-    """Who decides in the first round, in the rollouts and on the road."""
+    """Who decides in the first round, in the rollouts and on the road: `mobil` and the like, or `dqn`,
+    `dqn:FILE` to go on from a policy."""
     envs: int = 96
     """Environments."""
     episode_s: float = 300.0
@@ -65,16 +65,15 @@ class Settings:
     """Length of a rollout, s."""
     discount_frac_s: float = 0.99
     """What is left of a reward's worth after a second."""
+    change_cost_s: float = 0.25
+    """What a change costs in the reward, s, in the rollouts too: there every change that comes later
+    pays it as well, so nothing is gained by putting one off."""
     epochs: int = 30
     """Passes over the states in a round."""
     batch: int = 256
     """States in an update."""
     learning_rate: float = 1e-3
     """Adam's step at the beginning of a round; it falls to a twentieth on a cosine."""
-    change_cost_s: float = 0.0
-    """What a change has to gain beside its cost in the reward, s. The network that decides in the
-    rollouts has learned it too: a margin on its values alone would put changes off for ever, as to
-    change a second later is worth almost as much."""
     most_s: float = 3.0
     """Advantages are cut here, s: how bad the worst change is does not matter."""
     validate_every: int = 10
@@ -162,9 +161,9 @@ class Training:
         share = np.bincount(self.scenario, minlength=len(settings.scenarios)) / count
         weight = 1.0 / (share[self.scenario] * np.count_nonzero(share))
         obs, known = torch.from_numpy(self.obs), torch.from_numpy(~np.isnan(self.worth))
-        cost_s = settings.change_cost_s * (np.arange(len(ACTIONS)) != KEEP)
-        worth = np.nan_to_num(self.worth) - cost_s.astype(np.float32)
-        wanted = torch.from_numpy(worth.clip(-settings.most_s, settings.most_s))
+        wanted = torch.from_numpy(
+            np.nan_to_num(self.worth).clip(-settings.most_s, settings.most_s)
+        )
         weights = torch.from_numpy(weight.astype(np.float32))[:, None] * known
         adam = torch.optim.Adam(self.network.parameters(), settings.learning_rate)
         updates = settings.epochs * -(-count // settings.batch)
@@ -195,15 +194,15 @@ class Training:
             settings.scenarios,
             seeds,
             episode_s=settings.episode_s,
+            change_cost_s=settings.change_cost_s,
             threads=self.threads,
         )
         found = {
             f"valid_{name}": float(figures[name].mean())
             for name in ("reward_s", "delta_speed_frac", "lane_changes", "collided")
         }
-        changes_s = settings.change_cost_s * found["valid_lane_changes"]
-        if found["valid_reward_s"] - changes_s > self.best:
-            self.best = found["valid_reward_s"] - changes_s
+        if found["valid_reward_s"] > self.best:
+            self.best = found["valid_reward_s"]
             export(
                 self.network,
                 self.out / "policy.safetensors",
