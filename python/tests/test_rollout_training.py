@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import tractrix
+from cluster import two_workers
 
 torch = pytest.importorskip(
     "torch", reason='PyTorch is not installed: pip install "./python[train]"'
@@ -56,16 +57,11 @@ def test_one_seed_gives_one_network_on_any_threads_and_after_a_stop(
     importlib.util.find_spec("ray") is None, reason="Ray is not installed"
 )
 def test_actors_of_a_cluster_give_the_network_of_one_process(tmp_path: Path) -> None:
-    import ray
-
     whole = Training(small(), tmp_path / "whole")
     whole.run()
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-    try:
+    with two_workers():
         shared = Training(small(), tmp_path / "shared", actors=2)
         shared.run()
-    finally:
-        ray.shutdown()
     assert weights(shared) == weights(whole)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cluster import two_workers
 from tractrix.evaluate.sweep import Found, Part, here, on_ray
 from tractrix.train.asking import Asking, Draws, Team
 
@@ -25,10 +26,9 @@ ENVS, DECISIONS = 8, 120
 
 
 @pytest.fixture(scope="module", autouse=True)
-def cluster() -> Iterator[None]:
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-    yield
-    ray.shutdown()
+def _cluster() -> Iterator[None]:
+    with two_workers():
+        yield
 
 
 def asking() -> Asking:
