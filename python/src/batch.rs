@@ -5,7 +5,9 @@ use std::sync::{Mutex, PoisonError};
 
 use pyo3::buffer::PyBuffer;
 use pyo3::prelude::*;
-use sim::batch::{BasePolicy, Drivers, EnvSpec, EpisodeStats, Fidelity, RolloutSpec, Views};
+use sim::batch::{
+    BasePolicy, Drivers, EnvSpec, EpisodeStats, Fidelity, RewardConfig, RolloutSpec, Views,
+};
 use sim::{Overrides, SimError};
 use traffic_client::native::WindowConfig;
 
@@ -99,7 +101,7 @@ impl Batch {
     /// `count` environments, the scenarios (name, or JSON text) in turn.
     #[new]
     #[pyo3(signature = (count, scenarios, *, road, seed, fidelity, spec, episode_s, start_spread_m, window_m,
-        threads))]
+        change_cost_s, threads))]
     #[expect(clippy::too_many_arguments, reason = "keywords of one call from Python")]
     fn new(
         py: Python<'_>,
@@ -112,6 +114,7 @@ impl Batch {
         episode_s: f64,
         start_spread_m: f64,
         window_m: Option<(f64, f64)>,
+        change_cost_s: Option<f64>,
         threads: usize,
     ) -> PyResult<Self> {
         let fidelity = match fidelity {
@@ -129,6 +132,9 @@ impl Batch {
                 return Err(Fault::Value(format!("spec = {other:?}: ours or paper")).into());
             }
         };
+        if let Some(cost_s) = change_cost_s.filter(|cost_s| !(0.0..=100.0).contains(cost_s)) {
+            return Err(Fault::Value(format!("change_cost_s = {cost_s}: 0 to 100 s")).into());
+        }
         let build = || -> Result<Inner, Fault> {
             let changes = Overrides { road, ..Overrides::default() };
             let specs = scenarios.iter().map(|(name, json)| {
@@ -138,7 +144,9 @@ impl Batch {
                     let whole = behind_m == f64::INFINITY && ahead_m == f64::INFINITY;
                     (!whole).then_some(WindowConfig { behind_m, ahead_m, awake_m: None })
                 });
-                Ok(EnvSpec { episode_s, start_spread_m, window, ..usual })
+                let change_s = change_cost_s.unwrap_or(usual.reward.change_s);
+                let reward = RewardConfig { change_s, ..usual.reward };
+                Ok(EnvSpec { episode_s, start_spread_m, window, reward, ..usual })
             });
             let specs = specs.collect::<Result<Vec<_>, Fault>>()?;
             let specs: Vec<EnvSpec> = specs.iter().cycle().take(count).cloned().collect();

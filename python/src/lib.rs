@@ -42,7 +42,7 @@ mod _native {
     #[pymodule_export]
     use crate::plan::{plan_columns, plan_json};
     #[pymodule_export]
-    use crate::policy::{Policy, observation_hash};
+    use crate::policy::{Policy, observation_hash, observation_size};
     #[pymodule_export]
     use crate::scenario::{scenario_json, scenario_list};
     #[pymodule_export]

@@ -13,13 +13,22 @@ use crate::fault::Fault;
 const SPECS: [(&str, ObservationSpec); 2] =
     [("ours", ObservationSpec::Tractrix1), ("paper", ObservationSpec::Paper216)];
 
+fn named(spec: &str) -> Result<ObservationSpec, Fault> {
+    let known = SPECS.iter().find(|(word, _)| *word == spec);
+    let (_, of) = known.ok_or_else(|| Fault::Value(format!("spec = {spec:?}: ours or paper")))?;
+    Ok(*of)
+}
+
 /// The hash of an observation that a policy's sidecar has to name.
 #[pyfunction]
 pub(crate) fn observation_hash(spec: &str) -> Result<String, Fault> {
-    let known = SPECS.iter().find(|(word, _)| *word == spec);
-    known
-        .map(|(_, of)| format!("{:016x}", of.hash()))
-        .ok_or_else(|| Fault::Value(format!("spec = {spec:?}: ours or paper")))
+    Ok(format!("{:016x}", named(spec)?.hash()))
+}
+
+/// Numbers in an observation.
+#[pyfunction]
+pub(crate) fn observation_size(spec: &str) -> Result<usize, Fault> {
+    Ok(named(spec)?.size())
 }
 
 /// Weights with their sidecar.

@@ -15,7 +15,7 @@ use crate::decision::{Decision, word};
 use crate::ego::Ego;
 use crate::fault::Fault;
 use crate::scenario::changed;
-use crate::scene::rows;
+use crate::scene::{rows, vehicles};
 
 /// Python looks for signals (Ctrl-C) at least this often, wall time.
 const LOOK_UP: Duration = Duration::from_millis(50);
@@ -220,6 +220,16 @@ impl World {
             Ok(rows(hidden.map_or(&drive.latest.neighbours, |scene| &scene.neighbours)))
         })?;
         Ok(PyBytes::new(py, &rows))
+    }
+
+    /// Puts vehicles on a road without traffic of its own.
+    fn show(&self, py: Python<'_>, rows: &[u8]) -> Result<(), Fault> {
+        let others = vehicles(rows)?;
+        self.with(py, |drive| {
+            let road = drive.world.road().clone();
+            let shown = drive.world.traffic_mut().show(&others, &road);
+            shown.map_err(|e| Fault::Value(e.to_string()))
+        })
     }
 
     fn summary(&self, py: Python<'_>) -> Result<String, Fault> {

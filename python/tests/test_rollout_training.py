@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import tractrix
+from cluster import two_workers
 
 torch = pytest.importorskip(
     "torch", reason='PyTorch is not installed: pip install "./python[train]"'
@@ -49,6 +51,18 @@ def test_one_seed_gives_one_network_on_any_threads_and_after_a_stop(
     assert weights(other) != weights(whole)
     with pytest.raises(ValueError, match="trained otherwise"):
         Training(small(seed=2), tmp_path / "parts", resume=True)
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("ray") is None, reason="Ray is not installed"
+)
+def test_actors_of_a_cluster_give_the_network_of_one_process(tmp_path: Path) -> None:
+    whole = Training(small(), tmp_path / "whole")
+    whole.run()
+    with two_workers():
+        shared = Training(small(), tmp_path / "shared", actors=2)
+        shared.run()
+    assert weights(shared) == weights(whole)
 
 
 def test_a_minute_of_training_beats_keep_and_random_changes(tmp_path: Path) -> None:

@@ -174,3 +174,28 @@ def test_gymnasium_makes_and_checks_one() -> None:
     env.reset(seed=1)
     ended = [env.step(1)[3] for _ in range(5)]
     assert ended == [False] * 4 + [True]
+
+
+def test_a_change_costs_what_is_asked_in_advantages_too() -> None:
+    costs = (0.0, 5.0)
+    episodes, worths = [], []
+    for cost_s in costs:
+        env = tractrix.VectorEnv(
+            12, "table2-medium-12.5", 1, episode_s=60.0, change_cost_s=cost_s
+        )
+        env.reset()
+        for _ in range(30):
+            env.step(env.wishes("mobil"))
+        worths.append(env.advantages("keep", horizon_s=10.0))
+        for _ in range(30):
+            *_, infos = env.step(env.wishes("mobil"))
+        episodes.append(infos["final_info"])
+    changes = episodes[0]["lane_changes"]
+    paid = episodes[0]["reward_s"] - episodes[1]["reward_s"]
+    assert changes.sum() > 3
+    np.testing.assert_allclose(paid, 5.0 * changes, atol=1e-9)
+    first = (worths[0] - worths[1])[:, [0, 2]]
+    assert np.isfinite(first).any()
+    np.testing.assert_allclose(first[np.isfinite(first)], 5.0, atol=1e-5)
+    with pytest.raises(ValueError, match="change_cost_s = -1"):
+        tractrix.VectorEnv(1, change_cost_s=-1.0)

@@ -192,6 +192,47 @@ def test_an_empty_road_is_empty() -> None:
     assert len(world.scene()) == 0
 
 
+def test_vehicles_that_another_simulator_moves_are_driven_among() -> None:
+    scenario = tractrix.scenario("table2-medium-12.5")
+    ours = tractrix.World(scenario, seed=3, decider="keep")
+    scenario["traffic"]["family"] = None
+    theirs = tractrix.World(scenario, seed=3, decider="keep", traffic="none")
+    for _ in range(2000):
+        ours.step()
+        theirs.show(ours.scene())
+        theirs.step()
+    assert theirs.ego == ours.ego and len(theirs.scene()) > 2
+    assert theirs.decision is not None and theirs.decision.following is not None
+    state = theirs.summary()["state_hash"]
+    assert state == ours.summary()["state_hash"]
+    fork = theirs.snapshot()
+    shown = theirs.scene()
+    theirs.show(shown[:0])
+    theirs.step()
+    assert len(theirs.scene()) == 0
+    theirs.restore(fork)
+    assert theirs.scene().tolist() == shown.tolist()
+    off_lane = shown.copy()
+    off_lane["d_m"] += 100.0
+    theirs.show(off_lane)
+    theirs.step()
+    assert len(theirs.scene()) == 0, "who is on no lane is left out"
+
+    for field, value, named in (
+        ("speed_m_s", math.nan, "finite"),
+        ("rear_s_m", 1e9, "front_s_m beyond rear_s_m"),
+        ("class", "tram", "'tram'|\"tram\""),
+    ):
+        wrong = shown.copy()
+        wrong[field] = value
+        with pytest.raises(ValueError, match=named):
+            theirs.show(wrong)
+    with pytest.raises(ValueError, match="SCENE_DTYPE"):
+        theirs.show(np.zeros(3))  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="without traffic"):
+        ours.show(shown)
+
+
 def test_ego_decision_and_scene_tell_one_tick() -> None:
     world = tractrix.World("dense-15", seed=3)
     start = world.ego

@@ -16,10 +16,9 @@ from typing import Any
 from tractrix import _native
 from tractrix._arguments import path as as_text
 from tractrix._arguments import whole
+from tractrix._cluster import ATTEMPTS, each
 from tractrix._fleet_page import page
 
-_ATTEMPTS = 3
-"""How often a unit is begun whose worker dies."""
 _WORKER = "from tractrix._fleet import work; work()"
 
 
@@ -94,7 +93,8 @@ def diagnose_many(
     digests = {unit: _digest(unit) for unit in units}
     open_units = [unit for unit in units if _finished(unit, digests[unit]) is None]
     if ray:
-        _on_ray(open_units, digests, count)
+        arguments = [(unit, digests[unit]) for unit in open_units]
+        each(_compute, arguments, at_once=count, lost=_lost)
     else:
         with concurrent.futures.ThreadPoolExecutor(count) as pool:
             list(pool.map(lambda unit: _in_process(unit, digests[unit]), open_units))
@@ -193,33 +193,20 @@ def _compute(unit: Unit, digest: str) -> None:
 def _in_process(unit: Unit, digest: str) -> None:
     """The same in a process of its own, begun again if that dies."""
     words = json.dumps({"unit": asdict(unit), "digest": digest})
-    for _ in range(_ATTEMPTS):
+    for _ in range(ATTEMPTS):
         command = [sys.executable, "-c", _WORKER, words]
         ended = subprocess.run(command, capture_output=True, text=True, check=False)
         if _finished(unit, digest) is not None:
             return
     how = ended.stderr.strip().splitlines()[-1:] or [f"exit code {ended.returncode}"]
-    error = f"the worker died {_ATTEMPTS} times: {how[0]}"
-    _write_whole(
-        Path(unit.result),
-        json.dumps({"inputs_sha256": digest, "error": error}, sort_keys=True),
-    )
+    _lost(unit, digest, how[0])
 
 
-def _on_ray(units: Sequence[Unit], digests: dict[Unit, str], count: int) -> None:
-    try:
-        import ray
-    except ImportError as missing:
-        hint = 'a cluster is used with: pip install "tractrix[scale]"'
-        raise ImportError(hint) from missing
-    remote = ray.remote(max_retries=_ATTEMPTS - 1)(_compute)
-    waiting: list[Any] = []
-    for unit in units:
-        waiting.append(remote.remote(unit, digests[unit]))
-        if len(waiting) >= count:
-            done, waiting = ray.wait(waiting)
-            ray.get(done)
-    ray.get(waiting)
+def _lost(unit: Unit, digest: str, how: object) -> None:
+    """The result of a week whose worker died every time."""
+    error = f"the worker died {ATTEMPTS} times: {how}"
+    result = {"inputs_sha256": digest, "error": error}
+    _write_whole(Path(unit.result), json.dumps(result, sort_keys=True))
 
 
 def _rows(unit: Unit, found: dict[str, Any] | None) -> Iterator[dict[str, Any]]:

@@ -147,6 +147,25 @@ class World:
         """
         return np.frombuffer(self._native.scene(bool(truth)), dtype=SCENE_DTYPE)
 
+    def show(self, vehicles: npt.NDArray[np.void]) -> None:
+        """Puts vehicles that another simulator moves on the road, in place of those before.
+
+        The world has to have no traffic of its own (`traffic="none"`). They stay where they are until
+        the next are shown, so show them as often as the other simulator steps. What the truck then
+        does to them is the other simulator's part, from `ego`.
+
+        Args:
+            vehicles: Rows of `SCENE_DTYPE`. `lane`, `target_lane`, `x_m`, `y_m` and `yaw_rad` are not
+                read: they follow from the stations on this road; who is on none of its lanes is left
+                out.
+
+        Raises:
+            ValueError: Another kind of array, traffic of its own, or a vehicle without a body.
+        """
+        if not isinstance(vehicles, np.ndarray) or vehicles.dtype != SCENE_DTYPE:
+            raise ValueError("vehicles: an array of tractrix.SCENE_DTYPE")
+        self._native.show(vehicles.tobytes())
+
     def summary(self) -> dict[str, Any]:
         """The figures so far, with the keys of `summary.json` of `sim-server run`.
 

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use road::Road;
 use serde::Serialize;
 use tempfile::TempDir;
-use tractrix_core::{EgoState, Geometry, Scene, Time, TrafficSource};
+use tractrix_core::{EgoState, Geometry, Neighbour, Scene, Time, TrafficSource};
 use traffic_client::native::{NativeTraffic, TrafficConfig};
 use traffic_client::replay::{Recording, ReplayTraffic, load};
 use traffic_client::schedule::Schedule;
@@ -48,7 +48,7 @@ pub struct Arrivals {
 /// Where the vehicles come from.
 #[derive(Debug)]
 enum Engine {
-    /// An empty road.
+    /// An empty road, or one whose vehicles somebody else moves.
     None(Scene),
     /// The native engine.
     Native(Box<NativeTraffic>, Option<String>),
@@ -207,6 +207,46 @@ impl Traffic {
     #[must_use]
     pub fn truth(&self) -> Option<&Scene> {
         self.inner.truth()
+    }
+
+    /// Puts vehicles that somebody else moves on a road without traffic of its own (`source =
+    /// "none"`), in place of those that were shown before; they stay where they are until the next
+    /// are shown. Lane and place on the map are those of `road` at their stations; who is on no lane
+    /// of it is left out.
+    ///
+    /// # Errors
+    /// [`TrafficError::Config`] in other traffic, and for a number that is not finite or a vehicle
+    /// without length and width; nothing is changed then.
+    pub fn show(&mut self, others: &[Neighbour], road: &Road) -> Result<(), TrafficError> {
+        let Engine::None(scene) = self.inner.inner_mut().inner_mut() else {
+            let why = "vehicles are shown on a road without traffic, source = \"none\"";
+            return Err(TrafficError::Config { why: why.to_owned() });
+        };
+        for other in others {
+            let speeds = [other.speed_m_s, other.lateral_speed_m_s, other.accel_m_s2];
+            let place = [other.front_s_m, other.rear_s_m, other.d_m, other.width_m];
+            let has_body = other.front_s_m > other.rear_s_m && other.width_m > 0.0;
+            if !has_body || place.iter().chain(&speeds).any(|x| !x.is_finite()) {
+                let why = format!(
+                    "vehicle {}: finite numbers, front_s_m beyond rear_s_m, width_m above 0",
+                    other.id
+                );
+                return Err(TrafficError::Config { why });
+            }
+        }
+        scene.neighbours.clear();
+        scene.neighbours.extend(others.iter().filter_map(|other| {
+            let s_m = 0.5 * (other.front_s_m + other.rear_s_m);
+            let lane = road.lane_at(s_m, other.d_m)?;
+            let at = road.at(s_m, other.d_m);
+            let drift_rad = libm::atan2(other.lateral_speed_m_s, other.speed_m_s.max(1.0));
+            let (x_m, y_m, yaw_rad) = (at.x_m, at.y_m, at.heading_rad + drift_rad);
+            Some(Neighbour { lane, target_lane: None, x_m, y_m, yaw_rad, ..*other })
+        }));
+        scene
+            .neighbours
+            .sort_unstable_by(|a, b| a.front_s_m.total_cmp(&b.front_s_m).then(a.id.cmp(&b.id)));
+        Ok(())
     }
 
     /// SUMO, to read and set its variables (traffic lights, vehicle types, routes, ...).

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,8 @@ from tractrix import __git_revision__, __version__
 from tractrix._policy import SHIPPED
 from tractrix.evaluate import report
 from tractrix.evaluate.deciders import decider
-from tractrix.evaluate.drive import TABLE2, drive, with_spawn_interval
+from tractrix.evaluate.drive import TABLE2, with_spawn_interval
+from tractrix.evaluate.sweep import Found, Part, here, on_ray
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -48,39 +48,42 @@ def main(arguments: list[str] | None = None) -> None:
     )
     parser.add_argument("--fidelity", default="kinematic", help="kinematic or truck")
     parser.add_argument("--threads", type=int, default=1, help=" ")
+    parser.add_argument(
+        "--ray", action="store_true", help="share the seeds out over a Ray cluster"
+    )
     given = parser.parse_args(arguments)
     words = [word for text in given.deciders for word in text.split(",") if word]
     words = list(dict.fromkeys([report.REFERENCE, *words]))
     try:
-        known = {word: decider(word, given.weights) for word in words}
+        for word in words:
+            decider(word, given.weights)
         if given.seeds < 1:
             parser.error(f"--seeds {given.seeds}: at least 1")
-        seeds = range(given.first_seed, given.first_seed + given.seeds)
-        scenarios = {
-            name: with_spawn_interval(name, given.spawn_interval_s)
-            for name in given.scenarios
+        environment = {
+            "episode_s": given.duration_s,
+            "fidelity": given.fidelity,
+            "threads": given.threads,
         }
-        results: dict[str, dict[str, report.Figures]] = {s: {} for s in scenarios}
-        cpu_s: dict[str, float] = {}
-        for word, (decide, spec) in known.items():
-            before_s = time.process_time()
-            for name, scenario in scenarios.items():
-                figures = drive(
-                    decide,
-                    [scenario],
-                    seeds,
-                    spec=spec,
-                    episode_s=given.duration_s,
-                    fidelity=given.fidelity,
-                    threads=given.threads,
-                )
-                found = {figure: values[0] for figure, values in figures.items()}
-                results[name][word] = found
-                delta = 100 * np.mean(found["delta_speed_frac"])
-                print(f"{name} {word}: {delta:.2f} %", file=sys.stderr)
-            cpu_s[word] = time.process_time() - before_s
-    except (ValueError, OSError) as wrong:
+        parts = [
+            Part(
+                word,
+                name,
+                with_spawn_interval(name, given.spawn_interval_s),
+                range(given.first_seed, given.first_seed + given.seeds),
+                given.weights,
+                environment,
+            )
+            for word in words
+            for name in given.scenarios
+        ]
+        driven = (on_ray if given.ray else here)(parts, _tell)
+    except (ValueError, OSError, ImportError) as wrong:
         parser.error(str(wrong))
+    results: dict[str, dict[str, report.Figures]] = {s: {} for s in given.scenarios}
+    cpu_s = dict.fromkeys(words, 0.0)
+    for part, (found, took_s) in zip(parts, driven, strict=True):
+        results[part.name][part.word] = found
+        cpu_s[part.word] += took_s
     about = {
         "schema": 1,
         "version": __version__,
@@ -99,6 +102,11 @@ def main(arguments: list[str] | None = None) -> None:
         report.plot(rows, given.out / "front.svg")
     except ImportError:
         print("no plot: Matplotlib is not installed", file=sys.stderr)
+
+
+def _tell(part: Part, found: Found) -> None:
+    delta = 100 * np.mean(found[0]["delta_speed_frac"])
+    print(f"{part.name} {part.word}: {delta:.2f} %", file=sys.stderr)
 
 
 if __name__ == "__main__":

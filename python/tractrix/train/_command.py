@@ -21,6 +21,8 @@ def command(
     description: str,
     settings: Callable[..., Any],
     training: Callable[..., Trains],
+    *,
+    scales: bool = False,
 ) -> None:
     """Reads the command line of `python -m tractrix.train.NAME` and trains.
 
@@ -31,6 +33,7 @@ def command(
         description: What it does.
         settings: Data class of the settings, each with a default.
         training: Called with the settings, the folder, and what the other options say.
+        scales: It may have actors on a Ray cluster.
     """
     parser = argparse.ArgumentParser(
         prog=f"python -m tractrix.train.{name}",
@@ -49,10 +52,14 @@ def command(
         )
     parser.add_argument("--out", type=Path, required=True, help="folder of its files")
     parser.add_argument("--threads", type=int, default=1, help="of the environments")
+    names = ["out", "threads", "resume", "tensorboard"]
+    if scales:
+        names.append("actors")
+        text = "actors of a Ray cluster that drive and ask; 0: this process does"
+        parser.add_argument("--actors", type=int, default=0, help=text)
     parser.add_argument("--resume", action="store_true", help="go on from --out")
     parser.add_argument("--tensorboard", action="store_true", help="also write events")
     given = vars(parser.parse_args())
-    names = ("out", "threads", "resume", "tensorboard")
     own = {name: given.pop(name) for name in names}
     out: Path = own.pop("out")
     files = ("checkpoint.pt", "curve.json", "policy.safetensors")

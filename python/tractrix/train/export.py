@@ -18,6 +18,33 @@ from tractrix import _native
 from tractrix.train.network import ACTIONS, QNetwork
 
 
+def encoded(
+    network: QNetwork,
+    *,
+    spec: str,
+    seeds: Sequence[int] = (),
+    training: Mapping[str, Any] | None = None,
+    evaluation: Mapping[str, Any] | None = None,
+) -> tuple[bytes, str]:
+    """The contents of both files; the arguments are those of `export`."""
+    tensors = {
+        name: tensor.detach().cpu().contiguous()
+        for name, tensor in network.state_dict().items()
+    }
+    weights = save(tensors)
+    sidecar = {
+        "schema": 1,
+        "observation_hash": _native.observation_hash(spec),
+        "actions": list(ACTIONS),
+        "weights_sha256": hashlib.sha256(weights).hexdigest(),
+        "training_revision": _native.GIT_REVISION,
+        "seeds": list(seeds),
+        "training": dict(training or {}),
+        "evaluation": dict(evaluation or {}),
+    }
+    return weights, json.dumps(sidecar, indent=2) + "\n"
+
+
 def export(
     network: QNetwork,
     file: str | os.PathLike[str],
@@ -43,25 +70,12 @@ def export(
     weights_file = Path(file)
     if weights_file.suffix != ".safetensors":
         raise ValueError(f"{weights_file}: the name has to end with .safetensors")
-    tensors = {
-        name: tensor.detach().cpu().contiguous()
-        for name, tensor in network.state_dict().items()
-    }
-    weights = save(tensors)
-    sidecar = {
-        "schema": 1,
-        "observation_hash": _native.observation_hash(spec),
-        "actions": list(ACTIONS),
-        "weights_sha256": hashlib.sha256(weights).hexdigest(),
-        "training_revision": _native.GIT_REVISION,
-        "seeds": list(seeds),
-        "training": dict(training),
-        "evaluation": dict(evaluation),
-    }
+    weights, sidecar = encoded(
+        network, spec=spec, seeds=seeds, training=training, evaluation=evaluation
+    )
     weights_file.parent.mkdir(parents=True, exist_ok=True)
     weights_file.write_bytes(weights)
-    text = json.dumps(sidecar, indent=2) + "\n"
-    weights_file.with_suffix(".json").write_text(text)
+    weights_file.with_suffix(".json").write_text(sidecar)
 
 
 def network_of(file: str | os.PathLike[str]) -> QNetwork:

@@ -10,7 +10,7 @@ validation seeds is exported.
 
 A round begins with seeds of its own, so a training that goes on from the checkpoint of a round ends
 with the same bits as one that was never stopped. The same seed gives the same weights, whatever the
-number of environment threads.
+number of environment threads, and of actors on a Ray cluster (`asking`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import sys
-import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -27,10 +26,11 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from tractrix import VectorEnv
+from tractrix import _native
 from tractrix.evaluate.drive import TABLE2, drive
 from tractrix.train._command import command
-from tractrix.train.export import export
+from tractrix.train.asking import Asking, Draws, Team
+from tractrix.train.export import encoded, export
 from tractrix.train.network import QNetwork
 
 Array = npt.NDArray[Any]
@@ -49,7 +49,8 @@ class Settings:
     rounds: int = 5
     """Rounds: drive and ask, then fit."""
     first_base: str = "mobil"
-    """Who decides in the first round, in the rollouts and on the road."""
+    """Who decides in the first round, in the rollouts and on the road: `mobil` and the like, or `dqn`,
+    `dqn:FILE` to go on from a policy."""
     envs: int = 96
     """Environments."""
     episode_s: float = 300.0
@@ -64,6 +65,9 @@ class Settings:
     """Length of a rollout, s."""
     discount_frac_s: float = 0.99
     """What is left of a reward's worth after a second."""
+    change_cost_s: float = 0.25
+    """What a change costs in the reward, s, in the rollouts too: there every change that comes later
+    pays it as well, so nothing is gained by putting one off."""
     epochs: int = 30
     """Passes over the states in a round."""
     batch: int = 256
@@ -84,7 +88,8 @@ class Training:
     Args:
         settings: What it depends on.
         out: Folder of `checkpoint.pt`, `curve.json` and the best `policy.safetensors`.
-        threads: Threads of the environments.
+        threads: Threads of the environments, in each actor.
+        actors: Actors of a Ray cluster that drive and ask; 0: this process does. Same bits.
         resume: Go on from the checkpoint in `out`.
         tensorboard: Also write events for TensorBoard.
     """
@@ -95,6 +100,7 @@ class Training:
         out: Path,
         *,
         threads: int = 1,
+        actors: int = 0,
         resume: bool = False,
         tensorboard: bool = False,
     ) -> None:
@@ -102,13 +108,11 @@ class Training:
         torch.use_deterministic_algorithms(True)
         torch.manual_seed(settings.seed)
         self.settings, self.out, self.threads = settings, out, threads
-        self.env = VectorEnv(
-            settings.envs,
-            settings.scenarios,
-            episode_s=settings.episode_s,
-            threads=threads,
-        )
-        size = int(np.prod(self.env.single_observation_space.shape or ()))
+        given = dataclasses.asdict(settings)
+        names = [field.name for field in dataclasses.fields(Asking)]
+        asking = Asking(**{name: given[name] for name in names})
+        self.team = Team(asking, settings.envs, actors, threads)
+        size = _native.observation_size("ours")
         self.network = QNetwork(size)
         self.obs = np.zeros((0, size), np.float32)
         self.worth = np.zeros((0, 3), np.float32)
@@ -144,45 +148,12 @@ class Training:
 
     def _ask(self, rng: np.random.Generator) -> None:
         """Drives, and adds states with what changes are worth there."""
-        settings, env = self.settings, self.env
-        of = np.arange(settings.envs) % len(settings.scenarios)
-        seen: list[tuple[Array, Array, Array]] = []
-        with tempfile.TemporaryDirectory() as folder:
-            base = settings.first_base
-            if self.round > 0:
-                file = Path(folder) / "former.safetensors"
-                export(
-                    self.network,
-                    file,
-                    spec="ours",
-                    seeds=[],
-                    training={},
-                    evaluation={},
-                )
-                base = f"dqn:{file}"
-            obs, infos = env.reset(
-                seed=rng.integers(2**63, size=settings.envs).tolist()
-            )
-            for decision in range(1, settings.decisions + 1):
-                mask = infos["action_mask"].astype(np.bool_)
-                if decision % settings.ask_every == 0:
-                    worth = env.advantages(
-                        base,
-                        horizon_s=settings.horizon_s,
-                        discount_frac_s=settings.discount_frac_s,
-                    )
-                    known = (~np.isnan(worth)).sum(axis=1) > 1
-                    seen.append((obs[known], worth[known], of[known]))
-                if self.round > 0:
-                    actions = self.act(obs, mask)
-                else:
-                    actions = env.wishes(settings.first_base).astype(np.int64)
-                noise = np.where(mask, rng.random(mask.shape), -1.0).argmax(axis=1)
-                random = rng.random(settings.envs) < settings.explore_frac
-                obs, _, _, _, infos = env.step(np.where(random, noise, actions))
-        self.obs = np.concatenate([self.obs, *(one[0] for one in seen)])
-        self.worth = np.concatenate([self.worth, *(one[1] for one in seen)])
-        self.scenario = np.concatenate([self.scenario, *(one[2] for one in seen)])
+        draws = Draws.of(rng, self.settings.decisions, self.settings.envs)
+        former = encoded(self.network, spec="ours") if self.round > 0 else None
+        obs, worth, scenario = self.team.ask(draws, former)
+        self.obs = np.concatenate([self.obs, obs])
+        self.worth = np.concatenate([self.worth, worth])
+        self.scenario = np.concatenate([self.scenario, scenario])
 
     def _fit(self, rng: np.random.Generator) -> None:
         """Regresses the network on all states so far."""
@@ -223,6 +194,7 @@ class Training:
             settings.scenarios,
             seeds,
             episode_s=settings.episode_s,
+            change_cost_s=settings.change_cost_s,
             threads=self.threads,
         )
         found = {
@@ -294,6 +266,7 @@ def main() -> None:
         "Trains a lane-change policy on rollout advantages.",
         Settings,
         Training,
+        scales=True,
     )
 
 
