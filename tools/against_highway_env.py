@@ -2,7 +2,7 @@
 per CPU second, both with a decision each second and an observation.
 
 pip install "./python[gym]" highway-env
-python tools/against_highway_env.py [SCENARIO...]
+python tools/against_highway_env.py [SCENARIO[:AWAKE_M]...]
 """
 
 from __future__ import annotations
@@ -55,7 +55,15 @@ def highway(vehicles: int) -> Callable[[], int]:
 
 def ours(scenario: str) -> Callable[[], int]:
     """Kinematic environments on the scenario's whole road, on one thread."""
-    env = tractrix.VectorEnv(ENVIRONMENTS, scenario, seed=1, threads=1, copy=False)
+    name, _, awake_m = scenario.partition(":")
+    env = tractrix.VectorEnv(
+        ENVIRONMENTS,
+        name,
+        seed=1,
+        threads=1,
+        copy=False,
+        awake_m=float(awake_m) if awake_m else None,
+    )
     env.reset()
     keep = np.full(ENVIRONMENTS, KEEP)
 

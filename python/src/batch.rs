@@ -101,7 +101,7 @@ impl Batch {
     /// `count` environments, the scenarios (name, or JSON text) in turn.
     #[new]
     #[pyo3(signature = (count, scenarios, *, road, seed, fidelity, spec, episode_s, start_spread_m, window_m,
-        change_cost_s, threads))]
+        awake_m, change_cost_s, threads))]
     #[expect(clippy::too_many_arguments, reason = "keywords of one call from Python")]
     fn new(
         py: Python<'_>,
@@ -114,6 +114,7 @@ impl Batch {
         episode_s: f64,
         start_spread_m: f64,
         window_m: Option<(f64, f64)>,
+        awake_m: Option<f64>,
         change_cost_s: Option<f64>,
         threads: usize,
     ) -> PyResult<Self> {
@@ -144,6 +145,10 @@ impl Batch {
                     let whole = behind_m == f64::INFINITY && ahead_m == f64::INFINITY;
                     (!whole).then_some(WindowConfig { behind_m, ahead_m, awake_m: None })
                 });
+                let window = window.map(|window| WindowConfig { awake_m, ..window });
+                if awake_m.is_some() && window.is_none() {
+                    return Err(Fault::Value("awake_m: not without a window_m".to_owned()));
+                }
                 let change_s = change_cost_s.unwrap_or(usual.reward.change_s);
                 let reward = RewardConfig { change_s, ..usual.reward };
                 Ok(EnvSpec { episode_s, start_spread_m, window, reward, ..usual })

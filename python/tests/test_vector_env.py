@@ -73,6 +73,25 @@ def test_the_window_can_be_set_and_done_without() -> None:
         envs(window_m=(300.0, float("nan")))
 
 
+def test_those_far_away_can_sleep_on_an_even_road() -> None:
+    def drive(**arguments: Any) -> list[bytes]:
+        env = envs(scenario="table2-dense-12.5", episode_s=300.0, **arguments)
+        env.reset(seed=3)
+        return [env.step(keep())[0].tobytes() for _ in range(200)]
+
+    usual, sleepy = drive(), drive(awake_m=1500.0)
+    assert sleepy == drive(awake_m=1500.0)
+    # who slept comes near later
+    assert usual[:10] == sleepy[:10] and usual != sleepy
+    for wrong in (
+        {"awake_m": 399.0},
+        {"awake_m": 1500.0, "road": "builtin:highway"},
+        {"awake_m": 1500.0, "window_m": (np.inf, np.inf)},
+    ):
+        with pytest.raises(ValueError, match="awake_m"):
+            envs(**wrong)
+
+
 def test_reset_mask_leaves_the_others_alone() -> None:
     env = envs()
     env.reset(seed=1)

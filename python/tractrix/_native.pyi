@@ -101,6 +101,7 @@ class Batch:
         episode_s: float,
         start_spread_m: float,
         window_m: tuple[float, float] | None,
+        awake_m: float | None,
         change_cost_s: float | None,
         threads: int,
     ) -> Self: ...

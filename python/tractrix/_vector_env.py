@@ -53,6 +53,9 @@ class VectorEnv(
         window_m: Behind and ahead of the truck, m, within which vehicles act in every tick, those
             beyond every 0.5 s; infinity twice: all do always. Default: 300 and 400 where the truck is
             kinematic, else all.
+        awake_m: Farther than this from the truck, either way, vehicles drive on at the speed that
+            they have: on a road that is the same all along (`builtin:flat`), in free traffic. With
+            1,500 m traffic around the truck is that of the whole road. Default: they act everywhere.
         change_cost_s: What a lane change that begins costs in the reward and in `advantages`, s at
             the reference speed. Default: 0.25 for `ours`, 0 for `paper`.
         copy: Whether `reset` and `step` return copies of the observations, masks and rewards, or the
@@ -81,6 +84,7 @@ class VectorEnv(
         episode_s: float = 600.0,
         start_spread_m: float = 1000.0,
         window_m: tuple[float, float] | None = None,
+        awake_m: float | None = None,
         change_cost_s: float | None = None,
         copy: bool = True,
     ) -> None:
@@ -99,6 +103,7 @@ class VectorEnv(
             episode_s=float(episode_s),
             start_spread_m=float(start_spread_m),
             window_m=window_m,
+            awake_m=None if awake_m is None else float(awake_m),
             change_cost_s=None if change_cost_s is None else float(change_cost_s),
             threads=whole("threads", threads),
         )
