@@ -35,7 +35,7 @@ CARS_BEHIND, CARS_AHEAD = 5, 15
 WISHES_M_S = (9.5, 12.5)
 """Of the cars; the truck wishes 16.67 m/s."""
 SPACING = 2.0
-"""Of highway-env's `create_random`: 20 cars on about 0.5 km."""
+"""Of highway-env's `create_random`: 20 cars on about 0.7 km."""
 
 
 def body_m() -> tuple[float, float]:
