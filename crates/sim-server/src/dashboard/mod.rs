@@ -29,7 +29,6 @@ mod run_report;
 mod runs;
 mod server;
 mod sessions;
-mod settings;
 mod socket;
 mod strip;
 
