@@ -15,7 +15,7 @@ from running import Run, running
 
 # A viewer that is silent is gone after 30 s, one that does not take a message after 5 s, who does
 # not take an answer after 20 s; on a busy machine a little later.
-LATE_S = 15.0
+LATE_S = 40.0
 
 
 def connection(run: Run) -> socket.socket:
@@ -76,7 +76,7 @@ def test_viewers_do_not_hold_up_the_end_of_a_run(server: Path, tmp_path: Path) -
             reader.join()
         for one in [*stalled, *quick]:
             one.close()
-    assert took_s < 4.0
+    assert took_s < 8.0
     assert json.loads((tmp_path / "summary.json").read_text())["distance_m"] > 1.0
 
 

@@ -37,7 +37,13 @@ macro_rules! answers {
         })*
     };
 }
-answers!(StateNow Done Names States OneState OneWorld Worlds);
+answers!(StateNow Names States OneState OneWorld Worlds);
+
+impl Answer for Done {
+    fn refused(result: Outcome) -> Self {
+        Self { result }
+    }
+}
 
 impl Answer for Features {
     fn refused(_: Outcome) -> Self {
