@@ -9,7 +9,6 @@ use crate::failure::Failure;
 /// Shows a finished recording to Foxglove and Lichtblick, which play, pause, seek and choose the
 /// speed; until a signal. Needs a program that is built with `--features foxglove`.
 #[derive(Debug, Parser)]
-#[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "refused"))]
 pub(crate) struct Args {
     /// The recording.
     file: PathBuf,
