@@ -103,6 +103,8 @@ async def look(url: str, seen: Seen, pause_s: float) -> None:
                 max_size=None,
                 compression=None,
                 ping_interval=None,
+                # One that was slow has its end of the connection still to read
+                close_timeout=0.5,
             ) as viewer:
                 seen.connections += 1
                 async for text in viewer:

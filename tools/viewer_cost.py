@@ -3,9 +3,10 @@
     python tools/viewer_cost.py [--server BINARY ...] [--seconds 40] [--rounds 5]
 
 Runs all of them at the same time, in real time, so that the machine's other work is the same for
-each, and compares the 99th percentiles of their ticks in pairs; as often as asked for. Fails where
-viewers change the run (`state_hash`) or more than 10 % of its 99th percentile, in the median of the
-rounds. Several binaries (two revisions) run side by side too. Needs `websockets`.
+each, and compares the 99th percentiles of their ticks in pairs; as often as asked for. Beside them
+stands the processor time of the world's thread, which waiting for a core does not change: what
+viewers cost that thread itself. Fails where viewers change the run (`state_hash`) or more than 10 %
+of its 99th percentile, in the median of the rounds. Several binaries (two revisions) run side by side too. Needs `websockets`.
 """
 
 import argparse
@@ -18,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -63,6 +65,20 @@ def viewers(kind: str, url: str) -> list[Coroutine[Any, Any, None]]:
 KINDS = ("none", "slow", "stalled", "dead", "all")
 
 
+async def world_cpu_s(process: int, seen: list[float]) -> None:
+    """Keeps what the busiest thread has had of a core so far, s: the world's."""
+    while True:
+        threads = Path(f"/proc/{process}/task")
+        # The process may be gone
+        with suppress(OSError, ValueError):
+            used = [
+                int((thread / "schedstat").read_text().split()[0])
+                for thread in threads.iterdir()
+            ]
+            seen[0] = max([seen[0], *(1e-9 * ns for ns in used)])
+        await asyncio.sleep(0.2)
+
+
 @dataclass(frozen=True)
 class Ran:
     """What a run says of itself."""
@@ -70,6 +86,7 @@ class Ran:
     p50_us: float
     p99_us: float
     missed: int
+    cpu_s: float
     state_hash: str
 
 
@@ -82,7 +99,8 @@ async def run(server: Path, kind: str, options: list[str], out: Path) -> Ran:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
-    tasks: list[asyncio.Task[None]] = []
+    cpu_s = [0.0]
+    tasks = [asyncio.create_task(world_cpu_s(process.pid, cpu_s))]
     try:
         assert process.stderr is not None
         line = ""
@@ -90,7 +108,7 @@ async def run(server: Path, kind: str, options: list[str], out: Path) -> Ran:
             line = (await process.stderr.readline()).decode()
             assert line, "the server said no address"
         url = line.split("dashboard: ")[1].split()[0].replace("http", "ws") + "/ws"
-        tasks = [asyncio.create_task(one) for one in viewers(kind, url)]
+        tasks += [asyncio.create_task(one) for one in viewers(kind, url)]
         said, _ = await process.communicate()
     finally:
         for task in tasks:
@@ -101,7 +119,7 @@ async def run(server: Path, kind: str, options: list[str], out: Path) -> Ran:
     summary: dict[str, Any] = json.loads(said)
     times = summary["tick_time_us"]
     missed = summary["missed_deadlines"]
-    return Ran(times["p50"], times["p99"], missed, summary["state_hash"])
+    return Ran(times["p50"], times["p99"], missed, cpu_s[0], summary["state_hash"])
 
 
 async def measure(
@@ -144,7 +162,9 @@ def main() -> int:
 
 def judge(server: Path, rounds: list[dict[tuple[Path, str], Ran]]) -> bool:
     """Prints what one binary's viewers cost; whether that is little."""
-    print(f"{server}: 50 and 99 % of ticks below, us; over that of none")
+    print(
+        f"{server}: 50 and 99 % of ticks below, us; over that of none; the world's thread, CPU s"
+    )
     is_good = True
     for kind in KINDS:
         ran = [each[server, kind] for each in rounds]
@@ -156,9 +176,12 @@ def judge(server: Path, rounds: list[dict[tuple[Path, str], Ran]]) -> bool:
         )
         ratio = statistics.median(ratios)
         missed = sum(one.missed for one in ran)
+        cpu_s = statistics.median(one.cpu_s for one in ran)
+        cpus = [a.cpu_s / b.cpu_s for a, b in zip(ran, alone, strict=True)]
         print(
             f"  {kind:8} {p50:6.0f} {p99:6.0f}   {ratio - 1.0:+.1%}"
-            f" ({ratios[0] - 1.0:+.1%} to {ratios[-1] - 1.0:+.1%}), {missed} missed"
+            f" ({ratios[0] - 1.0:+.1%} to {ratios[-1] - 1.0:+.1%}), {missed} missed;"
+            f" {cpu_s:.2f} CPU s, {statistics.median(cpus) - 1.0:+.1%}"
         )
         same = {one.state_hash for one in ran + alone}
         if len(same) > 1:

@@ -1,4 +1,4 @@
-"""`--foxglove`, seen by a viewer: the recording's bytes, time, services, commands, refusals.
+"""`--foxglove`, seen by a viewer: the recording's bytes, time, services, commands, parameters, refusals.
 
 `SIM_SERVER` names a program that was built with `--features foxglove`.
 """
@@ -7,75 +7,21 @@ from __future__ import annotations
 
 import json
 import os
-import re
-import signal
 import socket
 import subprocess
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from viewer import Said, connected
-from websockets.exceptions import InvalidStatus
+from program import SERVER, recorded, running
+from viewer import connected
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
-
-SERVER = os.environ["SIM_SERVER"]
-
-
-class Run:
-    """A run under way, where its viewers connect, and what it says on stderr."""
-
-    def __init__(self, process: subprocess.Popen[str], url: str, folder: Path) -> None:
-        self.process = process
-        self.url = url
-        self.folder = folder
-
-    def end(self) -> str:
-        """Ends it as SIGTERM does; the rest of what it said."""
-        self.process.send_signal(signal.SIGTERM)
-        _, said = self.process.communicate(timeout=60)
-        assert self.process.returncode == 0, said
-        return said
-
-
-@contextmanager
-def running(folder: Path, *options: str) -> Iterator[Run]:
-    """A run that is shown to viewers."""
-    command: list[str | Path] = [SERVER, "run", "--headless", "--foxglove", "0"]
-    command += ["--out", folder, *options]
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stderr is not None
-            line = process.stderr.readline()
-            found = re.search(r"ws://127\.0\.0\.1:\d+", line)
-            assert found is not None, line
-            yield Run(process, found.group(), folder)
-        finally:
-            process.kill()
-
-
-def recorded(file: Path) -> tuple[dict[str, tuple[str, str, bytes]], list[Said]]:
-    """Topics with type, encoding and definition, and messages of a recording."""
-    with file.open("rb") as source:
-        reader = make_reader(source)
-        summary = reader.get_summary()
-        assert summary is not None
-        topics = {}
-        for channel in summary.channels.values():
-            schema = summary.schemas[channel.schema_id]
-            topics[channel.topic] = (schema.name, schema.encoding, schema.data)
-            assert channel.message_encoding == "cdr"
-        messages = [
-            Said(channel.topic, message.log_time, message.data)
-            for _, channel, message in reader.iter_messages()
-        ]
-    return topics, messages
 
 
 def test_a_viewer_gets_the_recordings_channels_schemas_and_bytes(
@@ -269,3 +215,98 @@ def test_viewers_change_no_bit_of_the_run(tmp_path: Path) -> None:
         out, _ = run.process.communicate(timeout=60)
     hashes = {json.loads(text)["state_hash"] for text in (alone.stdout, out)}
     assert len(hashes) == 1
+
+
+def test_parameters_are_read_and_written_through_the_sessions_commands(
+    tmp_path: Path,
+) -> None:
+    with running(tmp_path / "out", "--seed", "7", "--pace", "1") as run:
+        with connected(run.url) as viewer, connected(run.url) as other:
+            viewer.call("/pause")
+            before = viewer.parameters()
+            assert before["seed"] == "7" and before["scenario"] == "highway"
+            assert before["state"] == "paused" and before["pace"] == "realtime"
+            assert before["fault.perception"] is False
+            assert viewer.parameters("seed", "nothing") == {"seed": "7"}
+            other.subscribe_parameters("set_speed_m_s", "decider", "pace")
+            other.parameters("seed")
+            # Written: echoed to who asked, told to who wants to know
+            assert viewer.set_parameters(set_speed_m_s=15) == {"set_speed_m_s": 15.0}
+            other.until(lambda: other.told.get("set_speed_m_s") == 15.0)
+            new = {"decider": "external", "pace": "max", "fault.perception": True}
+            assert viewer.set_parameters(**new) == new
+            viewer.publish(1, "/command/lane_change", "left")
+            viewer.call("/set_speed", speed_m_s=16)
+            other.until(lambda: other.told.get("set_speed_m_s") == 16.0)
+            assert other.told["decider"] == "external" and other.told["pace"] == "max"
+            assert "state" not in other.told and not viewer.statuses
+            # Refused: in words, and what it is stays what it is
+            for name, value, why in (
+                ("set_speed_m_s", 99, "speed_m_s = 99: expected a speed"),
+                ("decider", "luck", "luck"),
+                ("pace", -1, "pace = -1: expected realtime"),
+                ("fault.engine", True, "bus"),
+                ("fault.luck", True, "expected localisation"),
+                ("state", "quitting", "expected playing, paused or stopped"),
+                ("seed", "8", "read only"),
+                ("nothing", 1, "no such parameter"),
+            ):
+                now = viewer.parameters(name)
+                assert viewer.set_parameters(**{name: value}) == now, name
+                said = viewer.statuses.pop()
+                assert said.startswith(f"{name}: ") and why in said, said
+            assert viewer.set_parameters(state="playing") == {"state": "playing"}
+            assert viewer.set_parameters(state="stopped") == {"state": "stopped"}
+            after = viewer.parameters()
+            assert after["decider"] == before["decider"], "another run from its start"
+        run.end()
+
+
+def test_a_viewer_says_no_more_than_it_may(tmp_path: Path) -> None:
+    """The protocol's crate takes 64 MB in a message from each of 16 viewers."""
+    with running(tmp_path / "out", "--pace", "1") as run:
+        with connected(run.url) as viewer:
+            assert viewer.parameters("x" * 60_000) == {}
+            with pytest.raises(ConnectionClosed):
+                viewer.socket.send("x" * 70_000)
+                viewer.drain()
+        with connected(run.url) as viewer:
+            assert viewer.call("/pause")["state"] == "paused"
+        said = run.end()
+    assert "cut a viewer off" in said
+
+
+def test_a_viewer_that_takes_nothing_is_cut_off(tmp_path: Path) -> None:
+    """The protocol's crate waits for ever until its last words to a stalled viewer are taken."""
+    with running(tmp_path / "out", "--pace", "20") as run:
+        at = ("127.0.0.1", int(run.url.rsplit(":", 1)[1]))
+        new = [Subprotocol("foxglove.sdk.v1")]
+        with connected(run.url) as viewer:
+            ids = [c["id"] for c in viewer.channels.values()]
+        wanted = [{"id": number, "channelId": number} for number in ids]
+        options: dict[str, Any] = {"max_queue": 1, "close_timeout": 1}
+        # The first viewer's sockets are gone
+        time.sleep(1.0)
+        before = descriptors(run.process.pid)
+        raw = socket.socket()
+        raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        raw.connect(at)
+        took_s = 0.0
+        # It ends a connection that is gone already
+        with (
+            suppress(ConnectionClosed),
+            connect(run.url, subprotocols=new, sock=raw, **options) as stalled,
+        ):
+            stalled.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+            began = time.monotonic()
+            # Both sockets of the door
+            while descriptors(run.process.pid) > before and took_s < 90.0:
+                time.sleep(0.5)
+                took_s = time.monotonic() - began
+        assert 20.0 < took_s < 90.0
+        run.end()
+
+
+def descriptors(process: int) -> int:
+    """Files and sockets that a process has open."""
+    return len(os.listdir(f"/proc/{process}/fd"))

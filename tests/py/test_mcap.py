@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
 
 TICKS = 2000
 
@@ -321,3 +322,15 @@ def test_a_killed_run_is_recovered_with_schemas_attachments_and_metadata(
         attached = [a.name for a in reader.iter_attachments()]
         assert attached == ["scenario.toml", "stack.toml"]
         assert [m.name for m in reader.iter_metadata()] == ["run"]
+
+
+def test_rosbags_reads_every_topic_too(short_run: Path) -> None:
+    """A third reader, which takes the types from the file as ROS' own tools do."""
+    decoded: Counter[str] = Counter()
+    with AnyReader([short_run / "run.mcap"]) as reader:
+        topics = {connection.topic for connection in reader.connections}
+        for connection, _, raw in reader.messages():
+            reader.deserialize(raw, connection.msgtype)
+            decoded[connection.topic] += 1
+    counts = Counter(topic for topic, _, _ in messages(short_run / "run.mcap"))
+    assert decoded == counts and set(counts) <= topics

@@ -122,9 +122,10 @@ class Peer:
 
 
 @contextmanager
-def running(*options: str) -> Iterator[subprocess.Popen[str]]:
+def running(*options: str, domain: int = DOMAIN) -> Iterator[subprocess.Popen[str]]:
     """A run in real time with its node, killed at the end."""
-    process = program(*options, "--headless", "--pace", "realtime", "--ros2")
+    ours = ("--headless", "--pace", "realtime", "--ros2")
+    process = program(*options, *ours, domain=domain)
     try:
         yield process
     finally:
@@ -144,8 +145,8 @@ def joined() -> Iterator[Peer]:
         rclpy.shutdown()
 
 
-def program(*options: str) -> subprocess.Popen[str]:
-    environment = os.environ | {"ROS_DOMAIN_ID": str(DOMAIN)}
+def program(*options: str, domain: int = DOMAIN) -> subprocess.Popen[str]:
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain)}
     for name in ("LD_LIBRARY_PATH", "PYTHONPATH"):
         environment.pop(name, None)
     return subprocess.Popen(

@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -403,3 +404,28 @@ def test_a_domain_that_cannot_be_is_named(tmp_path: Path) -> None:
     assert answer.stderr.strip().endswith(
         "ROS_DOMAIN_ID=300: expected a number from 0 to 232"
     )
+
+
+def test_every_entity_comes_at_once_to_who_is_reached_over_loopback_alone(
+    tmp_path: Path,
+) -> None:
+    """The middleware cannot send an answer in fragments: it must fit into one datagram."""
+    here, domain = Path(__file__).parent, DOMAIN + 100
+    over_loopback = {
+        "FASTDDS_DEFAULT_PROFILES_FILE": str(here / "loopback.xml"),
+        # Otherwise Fast DDS takes the transports of its own
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",
+        "ROS_DOMAIN_ID": str(domain),
+    }
+    with running("dense-15", "--out", str(tmp_path / "out"), domain=domain):
+        asked = subprocess.run(
+            [sys.executable, here / "entities.py"],
+            env=os.environ | over_loopback,
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=90,
+        )
+    found = json.loads(asked.stdout)
+    assert found["words"] == ""
+    assert found["states"] == found["named"] > 15, found

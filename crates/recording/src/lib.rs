@@ -6,7 +6,7 @@
 //! is left out, or ([`Backlog::Drop`], on a truck) the world goes on and the gap is counted. Chunks are closed
 //! twice a simulated second, so that a crash loses less than one second;
 //! [`recover`] makes a whole file of the rest. [`Reader`] reads fields by name, [`Inputs`] what the
-//! stack and its bus were given.
+//! stack and its bus were given, [`Player`] the messages as they are, from any time on.
 //!
 //! Message times are simulation time (nanoseconds since the start of the run), so that a recording
 //! of the same seed holds the same messages; the wall time of the start is in the metadata.
@@ -16,6 +16,7 @@ mod file;
 mod inputs;
 pub mod lane_lines;
 mod layout;
+mod player;
 mod reader;
 mod recorder;
 mod records;
@@ -28,6 +29,7 @@ mod writer;
 
 pub use error::RecordingError;
 pub use inputs::{About, BusCall, BusTrace, DriverWish, GivenStep, Inputs, SentFrame};
+pub use player::{MOST_LATCHED, PlayedChannel, PlayedMessage, Player};
 pub use reader::{Entry, Reader, Wanted};
 pub use recorder::{Backlog, BusHeader, Listener, Recording, RunHeader, Torn};
 pub use recover::{Recovered, recover, recover_into};

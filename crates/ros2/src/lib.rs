@@ -18,6 +18,7 @@ mod feed;
 mod interfaces;
 mod network;
 mod node;
+mod room;
 mod services;
 mod simulator;
 mod steps;

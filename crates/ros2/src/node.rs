@@ -30,7 +30,8 @@ use crate::error::Ros2Error;
 use crate::feed::{Feed, Outlet, clock_ns, feed};
 use crate::interfaces::command::{Asks, Bool, Control, Float64, Text};
 use crate::network::Network;
-use crate::services;
+use crate::room::Room;
+use crate::services::{self, Answer};
 use crate::simulator::{Refused, Simulator};
 use crate::steps;
 
@@ -66,9 +67,9 @@ impl Node {
     ) -> Result<Self, Ros2Error> {
         let participant = network.join()?;
         refuse_second_clock(&participant, network)?;
-        let context = Context::from_domain_participant(participant);
+        let context = Context::from_domain_participant(participant.clone());
         let context = context.map_err(|e| network.failure("context", e))?;
-        let mut setup = Setup::new(&context, network)?;
+        let mut setup = Setup::new(&context, participant, network)?;
         let log = Arc::new(setup.node.logging_handle());
         let publishers = setup.publishers(bus)?;
         let autoware = (names == Names::Autoware).then(|| setup.autoware()).transpose()?;
@@ -147,15 +148,20 @@ type Loop = Box<dyn FnOnce() -> LocalBoxFuture<'static, ()> + Send>;
 /// A node under construction.
 struct Setup {
     node: ros2_client::Node,
+    participant: DomainParticipant,
     network: Network,
 }
 
 impl Setup {
-    fn new(context: &Context, network: Network) -> Result<Self, Ros2Error> {
+    fn new(
+        context: &Context,
+        participant: DomainParticipant,
+        network: Network,
+    ) -> Result<Self, Ros2Error> {
         let name = NodeName::new("/", "tractrix").map_err(|e| network.failure("node", e))?;
         let node = context.new_node(name, NodeOptions::new());
         let node = node.map_err(|e| network.failure("node", format!("{e:?}")))?;
-        Ok(Self { node, network })
+        Ok(Self { node, participant, network })
     }
 
     /// A publisher for each topic of a recording that is not the stack's own, and for the frames of
@@ -309,7 +315,7 @@ impl Setup {
     ) -> Result<Loop, Ros2Error>
     where
         Req: Message + Clone + Send + 'static,
-        Resp: Message + Send + 'static,
+        Resp: Message + Answer + Send + 'static,
     {
         let qos = QosProfile::publisher_default().history(History::KeepLast { depth: 10 });
         let full_name = Name::new("/", name).map_err(|e| self.network.failure(name, e))?;
@@ -318,7 +324,7 @@ impl Setup {
             .node
             .create_server(ServiceMapping::Enhanced, &full_name, &kind, qos.clone(), qos)
             .map_err(|e| self.network.failure(name, e))?;
-        let simulator = Arc::clone(simulator);
+        let (simulator, room) = (Arc::clone(simulator), Room::new(&self.participant, name));
         Ok(Box::new(move || {
             async move {
                 let mut requests = server.receive_request_stream();
@@ -326,6 +332,7 @@ impl Setup {
                     // What cannot be read has no sender to answer
                     let Ok((id, request)) = request else { continue };
                     let response = answer(&*simulator, request).await;
+                    let response = services::fitting(response, room.bytes());
                     let _ = server.async_send_response(id, response).await;
                 }
             }

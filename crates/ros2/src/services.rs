@@ -23,9 +23,33 @@ const CATEGORY_DYNAMIC_OBJECT: u8 = 4;
 /// spawned (nothing can be).
 const WHOLE_SCOPES: [u8; 4] = [0, 3, 7, 255];
 
-/// Bytes of an answer, at most. A longer one would go in fragments, and RustDDS 0.15.1 writes a byte
-/// too many before the inline QoS of a fragment, which names the request: no client understands it.
-const MAX_ANSWER_BYTES: usize = 1300;
+/// An answer that can say why it says nothing else.
+pub(crate) trait Answer: Serialize {
+    fn refused(result: Outcome) -> Self;
+}
+
+macro_rules! answers {
+    ($($name:ident)*) => {
+        $(impl Answer for $name {
+            fn refused(result: Outcome) -> Self {
+                Self { result, ..Self::default() }
+            }
+        })*
+    };
+}
+answers!(StateNow Names States OneState OneWorld Worlds);
+
+impl Answer for Done {
+    fn refused(result: Outcome) -> Self {
+        Self { result }
+    }
+}
+
+impl Answer for Features {
+    fn refused(_: Outcome) -> Self {
+        Self::default()
+    }
+}
 
 pub(crate) async fn features(_: &dyn Simulator, _: Empty) -> Features {
     let features = SimulatorFeatures {
@@ -90,8 +114,7 @@ pub(crate) async fn entities(simulator: &dyn Simulator, wish: Filtered) -> Names
     match filtered(simulator.entities(), &wish.filters) {
         Ok(found) => {
             let entities = found.all.into_iter().map(|e| e.name).collect();
-            let too_long = |result| Names { result, ..Names::default() };
-            fitting(Names { result: Outcome::ok(), entities }, too_long)
+            Names { result: Outcome::ok(), entities }
         }
         Err(result) => Names { result, ..Names::default() },
     }
@@ -102,8 +125,7 @@ pub(crate) async fn entities_states(simulator: &dyn Simulator, wish: Filtered) -
         Ok(found) => {
             let states = found.all.iter().map(|e| state_of(found.time_ns, e)).collect();
             let entities = found.all.into_iter().map(|e| e.name).collect();
-            let too_long = |result| States { result, ..States::default() };
-            fitting(States { result: Outcome::ok(), states, entities }, too_long)
+            States { result: Outcome::ok(), states, entities }
         }
         Err(result) => States { result, ..States::default() },
     }
@@ -154,24 +176,23 @@ pub(crate) async fn worlds(simulator: &dyn Simulator, wish: FindWorlds) -> World
         let result = Outcome::error(Outcome::FEATURE_UNSUPPORTED, why);
         return Worlds { result, ..Worlds::default() };
     }
-    // Without the descriptions, or they would not fit: GetCurrentWorld has them
+    // Without the descriptions, or they would fit nowhere: GetCurrentWorld has them
     let short = |world: World| resource(World { description: String::new(), ..world });
     let worlds = simulator.worlds().into_iter().map(short).collect();
-    let too_long = |result| Worlds { result, ..Worlds::default() };
-    fitting(Worlds { result: Outcome::ok(), worlds }, too_long)
+    Worlds { result: Outcome::ok(), worlds }
 }
 
-/// The answer, or that it is too long.
-fn fitting<T: Serialize>(answer: T, too_long: impl FnOnce(Outcome) -> T) -> T {
+/// The answer, or that it is longer than so many bytes.
+pub(crate) fn fitting<T: Answer>(answer: T, most_bytes: usize) -> T {
     let bytes = cdr_encoding::to_vec::<T, LittleEndian>(&answer).map_or(usize::MAX, |b| b.len());
-    if bytes <= MAX_ANSWER_BYTES {
+    if bytes <= most_bytes {
         return answer;
     }
     let why = format!(
-        "the answer has {bytes} bytes, the middleware sends at most {MAX_ANSWER_BYTES}: ask for \
-         fewer (filters), or listen to /scene"
+        "the answer has {bytes} bytes, the middleware sends you at most {most_bytes}: ask for \
+         fewer (filters), listen to /scene, or be reached over loopback alone"
     );
-    too_long(Outcome::error(Outcome::OPERATION_FAILED, why))
+    T::refused(Outcome::error(Outcome::OPERATION_FAILED, why))
 }
 
 fn resource(world: World) -> WorldResource {
@@ -372,9 +393,9 @@ mod tests {
     fn an_answer_that_does_not_fit_is_refused() {
         let name = |i| "x".repeat(i);
         let names = |n: usize| Names { result: Outcome::ok(), entities: vec![name(28); n] };
-        let too_long = |result| Names { result, ..Names::default() };
-        assert_eq!(fitting(names(35), too_long).entities.len(), 35);
-        let refused = fitting(names(40), too_long);
+        assert_eq!(fitting(names(35), 1_300).entities.len(), 35);
+        assert_eq!(fitting(names(400), 60_000).entities.len(), 400);
+        let refused = fitting(names(40), 1_300);
         assert_eq!(refused.result.result, Outcome::OPERATION_FAILED);
         assert!(refused.result.error_message.contains("filters"), "{refused:?}");
     }

@@ -45,6 +45,8 @@ pub(crate) enum Command {
     Can(Box<cmd::can::Args>),
     /// Makes a whole recording of one torn by a crash.
     Recover(cmd::recover::Args),
+    /// Shows a finished recording to viewers of Foxglove's protocol.
+    Play(cmd::play::Args),
     /// Puts the virtual truck alone on a bus, in wall time.
     Ecu(cmd::ecu::Args),
     /// Makes truck files of data sheets, and sheets of truck files for programs on a truck.
@@ -96,6 +98,14 @@ pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
         _ => Err("not a finite number above zero".to_owned()),
+    }
+}
+
+/// The origin of a page, as a browser sends it: not `null`, which any page can be.
+pub(crate) fn origin(text: &str) -> Result<String, String> {
+    match text.split_once("://") {
+        Some((scheme, host)) if !scheme.is_empty() && !host.contains('/') => Ok(text.to_owned()),
+        _ => Err("SCHEME://HOST or SCHEME://HOST:PORT, without a path".to_owned()),
     }
 }
 

@@ -11,7 +11,11 @@ mod cmd;
 mod dashboard;
 mod failure;
 #[cfg(feature = "foxglove")]
+mod foxglove_door;
+#[cfg(feature = "foxglove")]
 mod foxglove_live;
+#[cfg(feature = "foxglove")]
+mod foxglove_played;
 mod jobs;
 mod listeners;
 mod out_folder;

@@ -1,5 +1,8 @@
 //! Ctrl-C, SIGTERM and SIGHUP: whoever asks a command to end.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use tokio::signal::unix::{SignalKind, signal};
 
 use crate::failure::Failure;
@@ -25,6 +28,14 @@ impl StopSignal {
 
 /// Number of SIGHUP (POSIX).
 const HANGUP: i32 = 1;
+
+/// Raises a flag at every signal: a run ends between two ticks, or the waiting behind its end.
+pub(crate) async fn raise(stop: Arc<AtomicBool>) {
+    loop {
+        stop_signal().await;
+        stop.store(true, Ordering::Relaxed);
+    }
+}
 
 /// Waits for a signal. A hangup does not count where whoever started the program had it ignored
 /// (`nohup`).

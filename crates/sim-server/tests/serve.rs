@@ -367,3 +367,23 @@ fn wrong_options_are_named() {
     assert!(refused(&["serve", "--sessions", "65"]).contains("--sessions"));
     assert!(refused(&["serve", "--assets", "/nothing/here"]).contains("--assets /nothing/here"));
 }
+
+/// A session that was forgotten played on, and held its place, as long as the server ran.
+#[test]
+fn a_session_that_nobody_wants_any_more_is_ended_with_its_summary() {
+    let mut server = Server::start(&["--session-idle-s", "3"]);
+    let wanted = json!({ "scenario": "flat", "state": "playing", "pace": "realtime" });
+    let [forgotten, wanted] = [server.begin(&wanted), server.begin(&wanted)];
+    let path = |session: &Value| format!("/api/v1/sessions/{}", session["id"].as_str().unwrap());
+    // Asked for until the other one is gone; a list asks for nobody
+    let list = server.wait_for("/api/v1/sessions", |list| {
+        assert_eq!(server.get(&path(&wanted)).0, 200);
+        list["sessions"].as_array().unwrap().len() == 1
+    });
+    assert_eq!(list["sessions"][0]["id"], wanted["id"]);
+    refusal(&server.get(&path(&forgotten)), 404, "no_session", "");
+    let summary = server.summary(forgotten["run"].as_str().unwrap());
+    assert_eq!(summary["end_reason"], "interrupted");
+    assert!(summary["duration_s"].as_f64().unwrap() > 1.0);
+    server.end();
+}

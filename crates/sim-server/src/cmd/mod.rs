@@ -9,6 +9,7 @@ pub(crate) mod experiment;
 pub(crate) mod identify;
 pub(crate) mod map;
 pub(crate) mod plan;
+pub(crate) mod play;
 pub(crate) mod process_replay;
 pub(crate) mod recover;
 pub(crate) mod replay;
@@ -39,6 +40,7 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Replay(args)) => replay::run(&args),
         Some(Command::ProcessReplay(args)) => process_replay::run(&args),
         Some(Command::Can(args)) => can::run(&args),
+        Some(Command::Play(args)) => play::run(args),
         Some(Command::Recover(args)) => recover::run(&args),
         Some(Command::Ecu(args)) => ecu::run(&args),
         Some(Command::Truck(command)) => truck::run(&command),

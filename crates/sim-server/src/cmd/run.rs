@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::builder::RangedU64ValueParser;
 use clap::{Parser, ValueEnum};
 
-use crate::cli::positive;
+use crate::cli::{origin, positive};
 use crate::dashboard::AccessArgs;
 use crate::failure::Failure;
 use crate::session::Pace;
@@ -118,14 +118,6 @@ fn vehicle(text: &str) -> Result<String, String> {
         None if ["direct", "bus"].contains(&text) => Ok(text.to_owned()),
         Some(("can" | "socketcand", _)) => Ok(text.to_owned()),
         _ => Err("direct, bus, can:IFACE or socketcand:HOST:PORT/IFACE".to_owned()),
-    }
-}
-
-/// The origin of a page, as a browser sends it: not `null`, which any page can be.
-fn origin(text: &str) -> Result<String, String> {
-    match text.split_once("://") {
-        Some((scheme, host)) if !scheme.is_empty() && !host.contains('/') => Ok(text.to_owned()),
-        _ => Err("SCHEME://HOST or SCHEME://HOST:PORT, without a path".to_owned()),
     }
 }
 

@@ -22,6 +22,9 @@ pub(crate) struct Args {
     /// Sessions at once, at most (1 to 64). Each drives in a thread of its own.
     #[arg(long, default_value_t = 8, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(1..=64))]
     sessions: usize,
+    /// A session that nobody has asked for, nor looked at, for so long is ended, with its summary.
+    #[arg(long, default_value_t = 86_400, value_name = "S", value_parser = RangedU64ValueParser::<u64>::new().range(1..=31_536_000))]
+    session_idle_s: u64,
     /// Folder of the runs: each has one of its own in it.
     #[arg(long, default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
@@ -37,6 +40,8 @@ pub(crate) struct Args {
 const LONGEST_END: Duration = Duration::from_secs(60);
 /// How often they are looked for.
 const LOOK: Duration = Duration::from_millis(20);
+/// How often those are looked for that nobody wants any more.
+const IDLE_LOOK: Duration = Duration::from_millis(500);
 
 /// Runs the command: until a signal.
 pub(crate) fn run(args: &Args) -> Result<(), Failure> {
@@ -60,6 +65,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         access,
     );
     runtime.spawn(Dashboard::new(listener, Arc::clone(&hub)).serve());
+    runtime.spawn(end_idle(Arc::clone(&sessions), Duration::from_secs(args.session_idle_s)));
     output::note(&format!("serving: http://{address}  (Ctrl-C ends it)"));
     runtime.block_on(async {
         crate::signals::stop_signal().await;
@@ -79,5 +85,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     match sessions.count() {
         0 => Ok(()),
         left => Err(Failure::Work(format!("{left} sessions did not end in time"))),
+    }
+}
+
+/// Ends sessions that nobody wants any more, until the runtime ends.
+async fn end_idle(sessions: Arc<Registry>, longest: Duration) {
+    loop {
+        tokio::time::sleep(IDLE_LOOK).await;
+        for session in sessions.stop_idle(longest) {
+            let (id, after_s) = (session.id(), longest.as_secs());
+            output::note(&format!("session {id}: ended, nobody asked for it for {after_s} s"));
+        }
     }
 }

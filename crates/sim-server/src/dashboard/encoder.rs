@@ -11,10 +11,9 @@ use sim::{GhostReport, Summary};
 use super::Shared;
 use super::ahead::{Lead, SpeedAhead};
 use super::frame::{Ego, Frame, GhostHere, Here, Other, Planned, Run, Snapshot};
-use super::settings::Settings;
 use super::strip::round;
 use crate::provenance::Provenance;
-use crate::session::{Pace, RunState};
+use crate::session::{Pace, RunState, Settings};
 
 /// What a frame is made of, as the world's thread leaves it.
 pub(super) struct Moment {

@@ -6,9 +6,8 @@ use serde::Serialize;
 use sim::Summary;
 use tractrix_core::{GuardReason, LaneChangeReason, LaneChangeRefusal, Maneuver, Plan, Tick};
 
-use super::settings::Settings;
 use super::strip::round;
-use crate::session::RunState;
+use crate::session::{RunState, Settings};
 
 /// Events that are kept, at most; the oldest go.
 const MOST: usize = 1_000;

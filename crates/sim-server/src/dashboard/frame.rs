@@ -9,10 +9,9 @@ use tractrix_core::{
 };
 
 use super::ahead::{Lead, SpeedAhead};
-use super::settings::Settings;
 use super::strip::round;
 use crate::provenance::Provenance;
-use crate::session::{Pace, RunState};
+use crate::session::{Pace, RunState, Settings};
 
 /// The frame sent to viewers and answered by `/api/v1/state`.
 #[derive(Debug, Serialize)]

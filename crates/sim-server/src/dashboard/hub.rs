@@ -86,6 +86,8 @@ impl FromRequestParts<Arc<Hub>> for Of {
         let named = RawPathParams::from_request_parts(parts, hub).await.ok();
         let named = named.as_ref().and_then(|all| all.iter().find(|(key, _)| *key == "session"));
         let id = named.map_or(DEFAULT, |(_, id)| id);
-        hub.sessions.get(id).map(Self).ok_or_else(|| problem::no_session(id))
+        let session = hub.sessions.get(id).ok_or_else(|| problem::no_session(id))?;
+        session.ask();
+        Ok(Self(session))
     }
 }

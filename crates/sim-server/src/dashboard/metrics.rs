@@ -117,7 +117,7 @@ impl Metrics {
     }
 
     /// All of them as text.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let mut text = String::new();
         // Writing to a string does not fail
         let _ = encode(&mut text, &self.registry);

@@ -29,15 +29,16 @@ mod run_report;
 mod runs;
 mod server;
 mod sessions;
-mod settings;
 mod socket;
 mod strip;
 
 use std::collections::VecDeque;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tokio::sync::watch;
+use tokio::time::Instant;
 
 pub(crate) use access::AccessArgs;
 #[cfg(feature = "foxglove")]
@@ -74,6 +75,8 @@ pub(crate) struct Shared {
     metrics: SessionMetrics,
     /// Ends the session between two ticks.
     pub(crate) stop: Arc<AtomicBool>,
+    /// When somebody asked for the session last (wall time).
+    asked: Mutex<Instant>,
 }
 
 /// A frame, and what a viewer must know about it without reading it.
@@ -119,7 +122,21 @@ impl Shared {
             handle,
             metrics: metrics.of_session(id),
             stop,
+            asked: Mutex::new(Instant::now()),
         })
+    }
+
+    /// Somebody asks for the session.
+    fn ask(&self) {
+        *self.asked.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+    }
+
+    /// How long nobody has asked for it, nor looked at it.
+    pub(crate) fn idle(&self) -> Duration {
+        if self.metrics.viewers.get() > 0 {
+            self.ask();
+        }
+        self.asked.lock().unwrap_or_else(PoisonError::into_inner).elapsed()
     }
 
     /// The session's id.

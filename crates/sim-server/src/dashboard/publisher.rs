@@ -6,17 +6,16 @@ use std::time::Duration;
 use planner::decider::DeciderKind;
 use road::Road;
 use sim::{Scenario, World};
-use tractrix_core::{Recorder, Tick};
+use tractrix_core::Tick;
 
 use super::Shared;
 use super::ahead::SpeedAhead;
 use super::encoder::{About, Encoder, Moment};
 use super::events::{Found, Watcher, What};
 use super::frame::{Refused, Snapshot};
-use super::settings::Settings;
 use super::strip::RowsDue;
 use crate::provenance::Provenance;
-use crate::session::{Pace, RunState};
+use crate::session::{Pace, RunState, Settings};
 
 /// Keeps what viewers are to see of a tick, and hands it to the [`Encoder`] when a frame is due; lives
 /// in the world's thread. A tick that brings no event and no row takes no lock that viewers share.
@@ -59,6 +58,29 @@ impl Publisher {
             mark: (0.0, 0.0),
             realtime_factor: 0.0,
         }
+    }
+
+    /// Keeps what is to be seen of a tick.
+    pub(crate) fn show(&mut self, tick: &Tick<'_>) {
+        self.watcher.tick(tick, &mut self.found);
+        tell(&mut self.found, &self.shared);
+        let kept = self.snapshot.get_or_insert_default();
+        kept.now = tick.now;
+        kept.ego = *tick.ego;
+        kept.plan.clone_from(tick.plan);
+        kept.scene.clone_from(tick.scene);
+        if let Some(refusal) = tick.plan.refusal {
+            let (reason, time_s) = (tick.plan.reason, tick.now.seconds());
+            kept.last_refusal = Some(Refused { refusal, reason, time_s });
+        }
+        if self.rows.take(tick) {
+            self.shared.strip().push(tick);
+        }
+    }
+
+    /// Counts what a tick adds to the figures.
+    pub(crate) fn count(&self, tick: &Tick<'_>) {
+        self.shared.metrics.guard_ticks.inc_by((!tick.plan.guard.is_empty()).into());
     }
 
     /// Publishes the last tick with the run's state.
@@ -127,33 +149,21 @@ fn tell(found: &mut Found, shared: &Shared) {
     }
 }
 
-impl Recorder for Publisher {
-    fn record(&mut self, tick: &Tick<'_>) {
-        self.shared.metrics.guard_ticks.inc_by((!tick.plan.guard.is_empty()).into());
-        self.watcher.tick(tick, &mut self.found);
-        tell(&mut self.found, &self.shared);
-        let kept = self.snapshot.get_or_insert_default();
-        kept.now = tick.now;
-        kept.ego = *tick.ego;
-        kept.plan.clone_from(tick.plan);
-        kept.scene.clone_from(tick.scene);
-        if let Some(refusal) = tick.plan.refusal {
-            let (reason, time_s) = (tick.plan.reason, tick.now.seconds());
-            kept.last_refusal = Some(Refused { refusal, reason, time_s });
-        }
-        if self.rows.take(tick) {
-            self.shared.strip().push(tick);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::atomic::AtomicBool;
 
     use super::super::Metrics;
+    use tractrix_core::Recorder;
+
     use super::*;
     use crate::session;
+
+    impl Recorder for Publisher {
+        fn record(&mut self, tick: &Tick<'_>) {
+            self.show(tick);
+        }
+    }
 
     fn shared(scenario: &Scenario, world: &World) -> Arc<Shared> {
         let (handle, _) = session::channel(scenario, 1, None);

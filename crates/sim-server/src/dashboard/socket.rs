@@ -58,6 +58,7 @@ pub(super) async fn upgrade(
     let named = uri.query().and_then(|query| query.strip_prefix("session="));
     let id = named.unwrap_or(DEFAULT);
     let Some(shared) = hub.sessions.get(id) else { return problem::no_session(id) };
+    shared.ask();
     let Ok(place) = Arc::clone(&hub.viewers).try_acquire_owned() else {
         return problem::too_many_viewers();
     };

@@ -4,14 +4,12 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use foxglove::websocket::Client;
-use foxglove::{ChannelBuilder, Context, PartialMetadata, RawChannel, Schema};
-use recording::{TOPICS, TopicMessage};
+use foxglove::{ChannelBuilder, Context, RawChannel, Schema};
+use recording::{MOST_LATCHED, TOPICS, TopicMessage};
 use tractrix_core::Time;
 
 use crate::failure::Failure;
-
-/// Messages of latched topics that are kept for viewers who come late: the pieces of a long road.
-const LATCHED: usize = 256;
+use crate::foxglove_door::stamp;
 
 /// The open channels.
 pub(super) struct Channels {
@@ -19,11 +17,6 @@ pub(super) struct Channels {
     _context: Arc<Context>,
     by_topic: BTreeMap<&'static str, Arc<RawChannel>>,
     latched: Mutex<Vec<(Time, TopicMessage)>>,
-}
-
-/// A time for viewers, nanoseconds since the start of the run.
-pub(super) fn nanoseconds(time: Time) -> u64 {
-    u64::try_from(time.0).unwrap_or_default()
 }
 
 impl Channels {
@@ -48,19 +41,23 @@ impl Channels {
         let Some(channel) = self.by_topic.get(message.topic.name) else { return };
         if message.topic.is_latched {
             let mut latched = self.latched();
-            if latched.len() == LATCHED {
-                latched.remove(0);
+            // The pieces of a long road push out its own, not another topic
+            let is_of_it = |(_, kept): &(Time, TopicMessage)| kept.topic == message.topic;
+            if latched.iter().filter(|m| is_of_it(m)).count() >= MOST_LATCHED
+                && let Some(oldest) = latched.iter().position(is_of_it)
+            {
+                latched.remove(oldest);
             }
             latched.push((now, message.clone()));
         }
-        channel.log_with_meta(&message.cdr, at(now));
+        channel.log_with_meta(&message.cdr, stamp(now));
     }
 
     /// What a viewer gets that subscribes a latched topic.
     pub(super) fn welcome(&self, viewer: &Client, topic: &str) {
         let Some(channel) = self.by_topic.get(topic) else { return };
         for (time, message) in self.latched().iter().filter(|(_, m)| m.topic.name == topic) {
-            channel.log_with_meta_to_sink(&message.cdr, at(*time), viewer.sink_id());
+            channel.log_with_meta_to_sink(&message.cdr, stamp(*time), viewer.sink_id());
         }
     }
 
@@ -72,8 +69,4 @@ impl Channels {
     fn latched(&self) -> MutexGuard<'_, Vec<(Time, TopicMessage)>> {
         self.latched.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-fn at(time: Time) -> PartialMetadata {
-    PartialMetadata::with_log_time(nanoseconds(time))
 }

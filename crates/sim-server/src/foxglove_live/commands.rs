@@ -69,7 +69,11 @@ async fn answer(session: Handle, action: &str, request: &[u8]) -> Result<String,
     ask(session, action, keys).await
 }
 
-async fn ask(
+/// Carries out a command of the API with these keys.
+///
+/// # Errors
+/// The words of the API.
+pub(super) async fn ask(
     session: Handle,
     action: &str,
     mut keys: Map<String, Value>,

@@ -1,26 +1,26 @@
 //! The session for viewers of Foxglove's WebSocket protocol (`foxglove.sdk.v1`): the recording's
-//! topics with the recording's own bytes and schemas, simulation time, and the commands of the API
-//! as services and published messages. On the loopback interface; the protocol authenticates nobody.
+//! topics with the recording's own bytes and schemas, simulation time, the commands of the API as
+//! services and published messages, and how the session is set as parameters. On the loopback
+//! interface; the protocol authenticates nobody.
 
 mod channels;
 mod commands;
-mod gate;
-mod refusals;
+mod parameters;
 
-use std::net::Ipv4Addr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use foxglove::websocket::Capability;
-use foxglove::{Context, FoxgloveError, WebSocketServer, WebSocketServerHandle};
+use foxglove::{Context, WebSocketServer, WebSocketServerHandle};
 use recording::Listener;
 use tokio::runtime;
 
 use self::channels::Channels;
 use self::commands::{Commands, services};
+use self::parameters::Parameters;
 use crate::failure::Failure;
-use crate::output;
+use crate::foxglove_door::{Door, nanoseconds};
 use crate::session::Handle;
 
 /// Messages on their way to a viewer; of more the oldest are lost to it.
@@ -49,38 +49,22 @@ impl Live {
         session: &Handle,
         runtime: &runtime::Handle,
     ) -> Result<Self, Failure> {
-        refusals::log();
-        let taken = |e: std::io::Error| match e.kind() {
-            std::io::ErrorKind::AddrInUse => {
-                Failure::Input(format!("--foxglove: port {port} on 127.0.0.1 is in use"))
-            }
-            _ => Failure::Input(format!("--foxglove {port}: {e}")),
-        };
-        let door = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(taken)?;
-        door.set_nonblocking(true).map_err(taken)?;
-        let address = door.local_addr().map_err(taken)?;
-        let hidden = gate::hidden();
+        let door = Door::open(port)?;
         let context = Context::new();
         let channels = Arc::new(Channels::open(&context)?);
         let commands = Commands::new(session.clone(), Arc::clone(&channels), runtime.clone());
         let server = WebSocketServer::new()
             .name("tractrix")
             .context(&context)
-            .tokio_runtime(runtime)
-            .bind(hidden.to_string(), 0)
             .capabilities([Capability::Time, Capability::ClientPublish])
             .supported_encodings(["json"])
             .services(services(session))
+            .parameter_handler(Arc::new(Parameters::new(session.clone(), runtime.clone())))
             .listener(Arc::new(commands))
-            .message_backlog_size(BACKLOG)
-            .start_blocking()
-            .map_err(|e: FoxgloveError| Failure::Input(format!("--foxglove {port}: {e}")))?;
-        let entered = runtime.enter();
-        let door = tokio::net::TcpListener::from_std(door).map_err(taken)?;
-        drop(entered);
-        runtime.spawn(gate::keep(door, (hidden, server.port()).into(), pages));
-        output::note(&format!("foxglove: ws://{address}"));
-        Ok(Self { server: Arc::new(server), channels, has_begun: AtomicBool::new(false) })
+            .message_backlog_size(BACKLOG);
+        let server = Arc::new(door.serve(server, pages, runtime)?);
+        runtime.spawn(parameters::tell(session.clone(), Arc::clone(&server)));
+        Ok(Self { server, channels, has_begun: AtomicBool::new(false) })
     }
 
     /// What the recording of the next run tells the viewers; they forget the run before.
@@ -97,7 +81,7 @@ impl Live {
             let wall = Instant::now();
             if told.is_none_or(|at| wall.saturating_duration_since(at) >= TIME_PERIOD) {
                 told = Some(wall);
-                server.broadcast_time(channels::nanoseconds(now));
+                server.broadcast_time(nanoseconds(now));
             }
         })
     }

@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 use tractrix_core::{Recorder, Step, Tick, Time};
 
 use super::pace::Pacer;
-use super::{Acted, Asked, Command, Handle, Next, Pace, Refused, RunState, State};
+use super::{Acted, Asked, Command, Controls, Handle, Next, Pace, Refused, RunState, State};
 use crate::dashboard::Publisher;
 use crate::failure::Failure;
 use crate::progress::Progress;
@@ -64,12 +64,17 @@ const ROUNDING_S: f64 = 1e-6;
 struct Views<'a> {
     publisher: Option<&'a mut Publisher>,
     handle: &'a Handle,
+    /// A copy of the world drives: the tick is seen and does not count.
+    is_copy: bool,
 }
 
 impl Recorder for Views<'_> {
     fn record(&mut self, tick: &Tick<'_>) {
         if let Some(publisher) = &mut self.publisher {
-            publisher.record(tick);
+            publisher.show(tick);
+            if !self.is_copy {
+                publisher.count(tick);
+            }
         }
         self.handle.note_bodies(tick);
     }
@@ -209,7 +214,8 @@ impl Drive {
             return;
         }
         let mut copy = self.job.world.clone();
-        let mut views = Views { publisher: self.job.publisher.as_mut(), handle: &self.job.handle };
+        let Job { publisher, handle, .. } = &mut self.job;
+        let mut views = Views { publisher: publisher.as_mut(), handle, is_copy: true };
         if copy.tick(&mut views).is_ok() {
             self.publish_if_due(RunState::Paused);
         }
@@ -225,9 +231,9 @@ impl Drive {
 
     fn drive_tick(&mut self) -> Result<Status, Failure> {
         let began = self.start.elapsed();
-        let views = Views { publisher: self.job.publisher.as_mut(), handle: &self.job.handle };
-        let mut sinks = Sinks { recording: &mut self.job.recording, views };
-        let status = self.job.world.tick(&mut sinks);
+        let Job { world, recording, publisher, handle, .. } = &mut self.job;
+        let views = Views { publisher: publisher.as_mut(), handle, is_copy: false };
+        let status = world.tick(&mut Sinks { recording, views });
         let ended = self.start.elapsed();
         self.times.add(ended - began);
         let missed = self.pacer.tick_ended(ended);
@@ -346,7 +352,12 @@ impl Drive {
                 return;
             }
         };
+        self.note_controls();
         let _ = reply.send(done.map(|()| self.acted()));
+    }
+
+    fn note_controls(&self) {
+        self.job.handle.note_controls(Controls::of(&self.job.world, self.pacer.pace()));
     }
 
     fn step(&mut self, action: &'static str, ticks: u64, wait: bool, reply: Reply) {
@@ -394,6 +405,54 @@ impl Drive {
         self.job.progress.show(&self.job.world);
         if let Some(publisher) = &mut self.job.publisher {
             publisher.publish(state, self.pacer.pace(), now, &self.job.world);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use sim::Scenario;
+    use tractrix_core::GuardReason;
+
+    use super::*;
+    use crate::dashboard::{Metrics, Shared};
+    use crate::provenance::Provenance;
+    use crate::session;
+
+    /// What a view is told of a tick in which the guard acts.
+    struct Guarded<'a>(Views<'a>);
+
+    impl Recorder for Guarded<'_> {
+        fn record(&mut self, tick: &Tick<'_>) {
+            let mut plan = tick.plan.clone();
+            plan.guard = vec![GuardReason::Stale];
+            self.0.record(&Tick { plan: &plan, ..*tick });
+        }
+    }
+
+    /// A run that stands at its start shows its first tick out of a copy of the world; driven, the
+    /// tick came once more, and what the guard did in it was counted twice.
+    #[test]
+    fn a_tick_that_is_only_shown_does_not_count() {
+        let scenario = Scenario::builtin("flat").unwrap();
+        let mut world = World::new(&scenario, 1).unwrap();
+        let (handle, _) = session::channel(&scenario, 1, None);
+        let (metrics, stop) = (Metrics::new(), Arc::new(AtomicBool::new(false)));
+        let setting = session::setting(&world);
+        let shared = Shared::new(&"s".into(), setting, handle.clone(), &metrics, stop);
+        let (run, road) = ("run".to_owned(), Arc::clone(world.road()));
+        let provenance = Provenance::of_seed(1);
+        let mut publisher = Publisher::new(Arc::clone(&shared), provenance, run, &scenario, road);
+        let counted = || {
+            let text = metrics.text();
+            let line = text.lines().find(|line| line.starts_with("tractrix_guard_ticks_total{"));
+            line.and_then(|line| line.rsplit(' ').next().map(str::to_owned)).unwrap()
+        };
+        for (is_copy, count) in [(true, "0"), (false, "1"), (true, "1")] {
+            let publisher = Some(&mut publisher);
+            let views = Views { publisher, handle: &handle, is_copy };
+            world.tick(&mut Guarded(views)).unwrap();
+            assert_eq!(counted(), count);
         }
     }
 }

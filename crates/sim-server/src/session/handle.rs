@@ -8,10 +8,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::Serialize;
 use sim::{Scenario, TrafficKind, World};
-use tokio::sync::oneshot;
+use tokio::sync::{oneshot, watch};
 use tractrix_core::{EgoState, Neighbour, Time};
 
-use super::Command;
+use super::{Command, Controls, Standing};
 use crate::bus_board::BusBoard;
 
 /// Commands under way, at most.
@@ -138,7 +138,6 @@ pub(crate) struct Bodies {
 
 /// What a session leaves for others to see.
 struct View {
-    state: State,
     scenario: Arc<Scenario>,
     seed: u64,
     bodies: Bodies,
@@ -158,6 +157,7 @@ const MAX_KEPT: usize = 8;
 pub(crate) struct Handle {
     queue: SyncSender<Asked>,
     view: Arc<Mutex<View>>,
+    standing: watch::Sender<Standing>,
     /// The bus outside that the truck is reached over: it has no way back to a start.
     outside_bus: Option<Arc<str>>,
     bus: BusBoard,
@@ -174,18 +174,11 @@ pub(crate) fn channel(
     let (queue, asked) = sync_channel(QUEUE);
     let scenario = Arc::new(scenario.clone());
     let (bodies, kept) = (Bodies::default(), BTreeMap::new());
-    let view = View {
-        state: State::Stopped,
-        scenario,
-        seed,
-        bodies,
-        folder: None,
-        is_recording: false,
-        kept,
-    };
+    let view = View { scenario, seed, bodies, folder: None, is_recording: false, kept };
+    let standing = watch::Sender::new(Standing { state: State::Stopped, controls: None });
     let outside_bus = outside_bus.map(Arc::from);
     let (view, bus, waiting) = (Arc::new(Mutex::new(view)), BusBoard::default(), Arc::default());
-    (Handle { queue, view, outside_bus, bus, waiting }, asked)
+    (Handle { queue, view, standing, outside_bus, bus, waiting }, asked)
 }
 
 impl Handle {
@@ -224,7 +217,7 @@ impl Handle {
     ) -> Result<Command, Refused> {
         let (scenario, same, now) = {
             let view = self.view();
-            (Arc::clone(&view.scenario), view.seed, view.state)
+            (Arc::clone(&view.scenario), view.seed, self.state())
         };
         self.begin(&scenario, seed.unwrap_or(same), state.unwrap_or(now))
     }
@@ -237,7 +230,7 @@ impl Handle {
         let view = self.view();
         let kept = view.kept.get(name).ok_or_else(|| Refused::NothingKept(name.to_owned()))?;
         let (world, seed) = kept.clone();
-        Ok(Command::Begin(Box::new(Next { world, seed, state: view.state })))
+        Ok(Command::Begin(Box::new(Next { world, seed, state: self.state() })))
     }
 
     /// Keeps a world.
@@ -290,7 +283,7 @@ impl Handle {
 
     /// The state now.
     pub(crate) fn state(&self) -> State {
-        self.view().state
+        self.standing.borrow().state
     }
 
     /// The scenario that is driven.
@@ -308,8 +301,22 @@ impl Handle {
         self.view().bodies.clone()
     }
 
+    /// State and settings now; it tells when they change.
+    #[cfg(feature = "foxglove")]
+    pub(crate) fn standing(&self) -> watch::Receiver<Standing> {
+        self.standing.subscribe()
+    }
+
     pub(crate) fn note_state(&self, state: State) {
-        self.view().state = state;
+        self.standing.send_if_modified(|now| std::mem::replace(&mut now.state, state) != state);
+    }
+
+    pub(super) fn note_controls(&self, controls: Controls) {
+        self.standing.send_if_modified(|now| {
+            let is_new = now.controls.as_ref() != Some(&controls);
+            now.controls = Some(controls);
+            is_new
+        });
     }
 
     /// The folder of the latest run, and whether it is still being written.

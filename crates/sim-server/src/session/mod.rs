@@ -15,6 +15,7 @@ mod pace;
 mod record;
 mod registry;
 mod runs;
+mod settings;
 mod start;
 mod vehicle;
 
@@ -25,4 +26,5 @@ pub(crate) use handle::{Acted, Handle, Next, Refused, RunState, State, answer, c
 pub(crate) use pace::Pace;
 pub(crate) use registry::{Claim, DEFAULT, Registry};
 pub(crate) use runs::{Begin, Place, RESULTS, Runs, first_world, setting};
+pub(crate) use settings::{Controls, Settings, Standing};
 pub(crate) use start::{Wanted, start};

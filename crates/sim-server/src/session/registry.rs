@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use crate::dashboard::Shared;
 
@@ -69,6 +70,14 @@ impl Registry {
         for session in self.all() {
             session.stop.store(true, Ordering::Relaxed);
         }
+    }
+
+    /// Ends those that nobody has asked for, nor looked at, for so long; says which.
+    pub(crate) fn stop_idle(&self, longest: Duration) -> Vec<Arc<Shared>> {
+        let is_idle = |session: &Arc<Shared>| {
+            session.idle() > longest && !session.stop.swap(true, Ordering::Relaxed)
+        };
+        self.all().into_iter().filter(is_idle).collect()
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {

@@ -14,7 +14,9 @@ use tractrix_core::Vehicle;
 
 use super::DEFAULT;
 use super::record::{finish, run_id, start_recording, unix_time};
-use super::{Acted, Asked, Command, Drive, Ended, Handle, Job, Next, Pace, Refused, Reply, State};
+use super::{
+    Acted, Asked, Command, Controls, Drive, Ended, Handle, Job, Next, Pace, Refused, Reply, State,
+};
 use crate::dashboard::{self, Publisher, Setting, Shared};
 use crate::failure::Failure;
 use crate::listeners::Listeners;
@@ -94,6 +96,7 @@ impl Runs {
         let recording =
             start_recording(&out, started, seed, &world, bus, self.listeners.listener())?;
         self.handle.note_world(&world, seed, &out.path());
+        self.handle.note_controls(Controls::of(&world, self.pace));
         let publisher = self.shared.as_ref().map(|shared| {
             shared.begin(setting(&world));
             let (road, run_id) = (Arc::clone(world.road()), run_id(started));

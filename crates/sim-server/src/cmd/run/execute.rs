@@ -1,7 +1,7 @@
 //! The shell of a run: server, signals, threads.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use sim::Scenario;
@@ -43,7 +43,7 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
         .enable_all()
         .build()
         .map_err(Failure::work)?;
-    runtime.spawn(raise_at_signal(Arc::clone(&stop)));
+    runtime.spawn(crate::signals::raise(Arc::clone(&stop)));
     let listeners = Listeners::start(super::options::networks(args), &handle, runtime.handle())?;
     let usual = if args.headless { Pace::Max } else { Pace::REALTIME };
     let runs = Runs {
@@ -82,12 +82,4 @@ pub(super) fn execute(args: &Args, seed: u64, scenario: &Scenario) -> Result<(),
     runtime.shutdown_background();
     let (summary, json, folder) = ended?;
     super::report::report(args.json, &summary, &json, &folder)
-}
-
-/// A signal stops the run between two ticks, or the waiting behind its end.
-async fn raise_at_signal(stop: Arc<AtomicBool>) {
-    loop {
-        crate::signals::stop_signal().await;
-        stop.store(true, Ordering::Relaxed);
-    }
 }

@@ -1,5 +1,9 @@
-//! The door before the protocol's server, which looks at no header: a connection is passed on when
-//! its handshake asks for this computer, and comes from a program or from a page that may show runs.
+//! The door before the server of Foxglove's protocol, which looks at no header and bounds no message:
+//! a connection is passed on when its handshake asks for this computer, and comes from a program or
+//! from a page that may show runs; what it sends is bounded, and so is how long it may take nothing.
+
+mod frames;
+mod refusals;
 
 use std::collections::hash_map::RandomState;
 use std::hash::BuildHasher;
@@ -8,12 +12,19 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
+use foxglove::{FoxgloveError, PartialMetadata, WebSocketServer, WebSocketServerHandle};
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpListener, TcpStream};
+use tokio::runtime;
 use tokio::sync::Semaphore;
 use tokio::time::timeout;
+use tokio_io_timeout::TimeoutStream;
+use tractrix_core::Time;
 
+use self::frames::Frames;
 use crate::dashboard::is_this_computer;
+use crate::failure::Failure;
+use crate::output;
 
 /// Viewers at a time, those in the handshake included.
 const MOST: usize = 16;
@@ -25,12 +36,79 @@ const MAX_HEADERS: usize = 64;
 const HANDSHAKE: Duration = Duration::from_secs(5);
 /// After an error of the listener, so that one that lasts takes no processor time.
 const PAUSE: Duration = Duration::from_millis(100);
+/// A viewer that takes nothing for so long is gone.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(20);
 /// The page of Foxglove itself.
 const FOXGLOVE: &str = "https://app.foxglove.dev";
 
+/// A time for viewers, nanoseconds since the start of the run.
+pub(crate) fn nanoseconds(time: Time) -> u64 {
+    u64::try_from(time.0).unwrap_or_default()
+}
+
+/// The time of a message.
+pub(crate) fn stamp(time: Time) -> PartialMetadata {
+    PartialMetadata::with_log_time(nanoseconds(time))
+}
+
+/// An open door that leads nowhere yet.
+pub(crate) struct Door {
+    listener: std::net::TcpListener,
+    /// As it was asked for.
+    port: u16,
+}
+
+impl Door {
+    /// Opens it on 127.0.0.1; port 0 takes a free one.
+    ///
+    /// # Errors
+    /// [`Failure::Input`]: the port is taken.
+    pub(crate) fn open(port: u16) -> Result<Self, Failure> {
+        refusals::log();
+        let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port));
+        let listener = listener.map_err(|e| unusable(port, &e))?;
+        listener.set_nonblocking(true).map_err(|e| unusable(port, &e))?;
+        Ok(Self { listener, port })
+    }
+
+    /// Starts a server behind it and lets viewers in, until the runtime ends. `pages` are origins
+    /// beside those of this computer and of Foxglove. Not to be called where the runtime runs.
+    ///
+    /// # Errors
+    /// [`Failure::Input`]: the server cannot start.
+    pub(crate) fn serve(
+        self,
+        server: WebSocketServer,
+        pages: Vec<String>,
+        runtime: &runtime::Handle,
+    ) -> Result<WebSocketServerHandle, Failure> {
+        let Self { listener, port } = self;
+        let address = listener.local_addr().map_err(|e| unusable(port, &e))?;
+        let inner = hidden();
+        let server = server.tokio_runtime(runtime).bind(inner.to_string(), 0).start_blocking();
+        let wrong = |e: FoxgloveError| Failure::Input(format!("--foxglove {port}: {e}"));
+        let server = server.map_err(wrong)?;
+        let entered = runtime.enter();
+        let listener = TcpListener::from_std(listener).map_err(|e| unusable(port, &e))?;
+        drop(entered);
+        runtime.spawn(keep(listener, (inner, server.port()).into(), pages));
+        output::note(&format!("foxglove: ws://{address}"));
+        Ok(server)
+    }
+}
+
+fn unusable(port: u16, e: &io::Error) -> Failure {
+    match e.kind() {
+        io::ErrorKind::AddrInUse => {
+            Failure::Input(format!("--foxglove: port {port} on 127.0.0.1 is in use"))
+        }
+        _ => Failure::Input(format!("--foxglove {port}: {e}")),
+    }
+}
+
 /// Where the protocol's own server listens: an address of this computer that a page would have to
 /// guess, because whoever reaches it passes the door by.
-pub(super) fn hidden() -> Ipv4Addr {
+fn hidden() -> Ipv4Addr {
     if !cfg!(target_os = "linux") {
         // Elsewhere 127.0.0.1 is the only address of the loopback interface.
         return Ipv4Addr::LOCALHOST;
@@ -39,9 +117,8 @@ pub(super) fn hidden() -> Ipv4Addr {
     Ipv4Addr::new(127, a.max(1), b, c.clamp(1, 254))
 }
 
-/// Lets viewers in from `listener` to the server at `inner`, until the runtime ends. `pages` are
-/// origins beside those of this computer and of Foxglove.
-pub(super) async fn keep(listener: TcpListener, inner: SocketAddr, pages: Vec<String>) {
+/// Lets viewers in from `listener` to the server at `inner`.
+async fn keep(listener: TcpListener, inner: SocketAddr, pages: Vec<String>) {
     let pages = Arc::new(pages);
     let places = Arc::new(Semaphore::new(MOST));
     loop {
@@ -79,7 +156,47 @@ async fn let_in(mut viewer: TcpStream, inner: SocketAddr, pages: &[String]) -> i
     server.set_nodelay(true)?;
     viewer.set_nodelay(true)?;
     server.write_all(&head).await?;
-    tokio::io::copy_bidirectional(&mut viewer, &mut server).await?;
+    let mut viewer = TimeoutStream::new(viewer);
+    viewer.set_write_timeout(Some(WRITE_TIMEOUT));
+    let mut viewer = Box::pin(viewer);
+    let (mut from_viewer, mut to_viewer) = tokio::io::split(&mut viewer);
+    let (mut from_server, mut to_server) = server.split();
+    // Who hangs up, or is cut off, ends both ways
+    tokio::select! {
+        heard = pass_on(&mut from_viewer, &mut to_server, after_head(&head)) => heard,
+        told = tokio::io::copy(&mut from_server, &mut to_viewer) => told.map(drop),
+    }
+}
+
+/// What came behind a request's head.
+fn after_head(head: &[u8]) -> &[u8] {
+    let end = head.windows(4).position(|end| end == b"\r\n\r\n");
+    end.and_then(|at| head.get(at + 4..)).unwrap_or_default()
+}
+
+/// Passes on what a viewer sends, whose first bytes have been passed on already; one whose message
+/// is too long is cut off.
+async fn pass_on(
+    viewer: &mut (impl AsyncReadExt + Unpin),
+    server: &mut (impl AsyncWriteExt + Unpin),
+    first: &[u8],
+) -> io::Result<()> {
+    let mut frames = Frames::default();
+    let mut bytes = vec![0_u8; 8192];
+    let mut goes_on = frames.read(first);
+    while goes_on {
+        let got = viewer.read(&mut bytes).await?;
+        let got = bytes.get(..got).unwrap_or_default();
+        if got.is_empty() {
+            return Ok(());
+        }
+        goes_on = frames.read(got);
+        if goes_on {
+            server.write_all(got).await?;
+        }
+    }
+    let most = frames::MAX_MESSAGE_BYTES;
+    log::error!(target: "foxglove", "cut a viewer off: its message has more than {most} bytes");
     Ok(())
 }
 
