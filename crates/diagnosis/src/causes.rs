@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::course::{Point, signals};
+use crate::decisions::{LISTED_NATS, STRONG_NATS};
 use crate::hypothesis::CATALOGUE;
 use crate::problem::Problem;
 use crate::refit::Fit;
@@ -10,14 +11,8 @@ use crate::screen::outside;
 use crate::sentence;
 use crate::sure::{beyond, shows};
 use crate::unknown::{Acts, Shape};
-use crate::weights::{Weighed, probability, weights};
+use crate::weights::{Weighed, beside, probability, weights};
 use crate::{Cause, Confusion, Parameter};
-
-/// Evidence within which another cause says as much as the named one, nats: a lone faint cause with
-/// such a rival is not stated.
-const RIVAL_NATS: f64 = 3.0;
-/// Evidence within which another cause is listed, nats.
-const LISTED_NATS: f64 = 5.0;
 
 /// A named cause, and whether another one says as much.
 pub(crate) struct Named {
@@ -77,18 +72,6 @@ impl Compared<'_> {
         }
     }
 
-    /// Free functions beside all causes: a function in the place of one competes with these, too.
-    fn beside(&mut self) {
-        for s in beyond(self.problem, &Point::of(self.fit)) {
-            self.models.push(Weighed {
-                causes: ids(&self.fit.set),
-                function: Some(self.functions.len()),
-                log_z: self.fit.log_z + s.firm,
-            });
-            self.functions.push(s);
-        }
-    }
-
     /// Causes of `open` beside `fewer`, which is the fit without its `i`-th cause that loses
     /// `lost_nats`; those that say nearly as much are listed.
     fn rivals(
@@ -121,7 +104,7 @@ impl Compared<'_> {
             instead.push(id);
             self.model(instead, self.fit.log_z - lost.max(0.0));
             if lost < LISTED_NATS && confused_with.iter().all(|x| x.id != id) {
-                rivalled |= lost < RIVAL_NATS;
+                rivalled |= lost < STRONG_NATS;
                 let why = sentence::confusion(hyp.id, id, lost);
                 confused_with.push(Confusion { id, why, probability: 0.0 });
             }
@@ -141,11 +124,12 @@ pub(crate) fn causes(
 ) -> Answer {
     let (evidence, zero) = (problem.evidence(), &problem.reference.theta);
     let variances = evidence.variances(fit);
-    let mut compared = Compared { problem, fit, empty, models: Vec::new(), functions: Vec::new() };
+    // Free functions beside all causes: a function in the place of one competes with these, too.
+    let left = beyond(problem, &Point::of(fit));
+    let firm: Vec<f64> = left.iter().map(|s| s.firm).collect();
+    let mut compared = Compared { problem, fit, empty, models: Vec::new(), functions: left };
     compared.model(ids(&fit.set), fit.log_z);
     compared.model(Vec::new(), 0.0);
-    compared.beside();
-    let beside = compared.functions.len();
     let without: Vec<Option<Fit>> = (0..fit.set.len())
         .map(|i| {
             let (fewer, theta) = evidence.without(fit, i);
@@ -157,16 +141,14 @@ pub(crate) fn causes(
         })
         .collect();
     let lost = |f: &Option<Fit>| fit.log_z - f.as_ref().map_or(0.0, |f| f.log_z);
-    // The cause that the others stand beside.
-    let main = (0..without.len()).max_by(|a, b| lost(&without[*a]).total_cmp(&lost(&without[*b])));
+    let nats: Vec<f64> = without.iter().map(lost).collect();
     let mut out = Vec::new();
     for (i, (h, without)) in fit.set.iter().zip(&without).enumerate() {
         let hyp = &CATALOGUE[*h];
-        let lost_nats = lost(without);
+        let lost_nats = nats[i];
         let (mut confused_with, mut rivalled) = (Vec::new(), false);
         if let Some(fewer) = without {
-            let worth =
-                if main == Some(i) { lost_nats } else { evidence.beside(fit, i, lost_nats) };
+            let worth = evidence.worth(fit, i, &nats);
             compared.model(ids(&fewer.set), fit.log_z - worth);
             compared.functions(i, fewer, bare);
             (confused_with, rivalled) = compared.rivals(i, fewer, lost_nats, open);
@@ -202,7 +184,8 @@ pub(crate) fn causes(
         };
         out.push(Named { cause, rivalled });
     }
-    let Compared { models, functions, .. } = compared;
+    let Compared { mut models, functions, .. } = compared;
+    models.extend(beside(&models, &firm));
     let weights = weights(&models);
     for named in &mut out {
         let cause = &mut named.cause;
@@ -215,7 +198,7 @@ pub(crate) fn causes(
     }
     out.sort_by(|a, b| b.cause.evidence.total_cmp(&a.cause.evidence));
     let mut instead: Vec<(Shape, f64)> = Vec::new();
-    for (n, shape) in functions.into_iter().enumerate().skip(beside) {
+    for (n, shape) in functions.into_iter().enumerate().skip(firm.len()) {
         instead.push((shape, probability(&models, &weights, |m| m.function == Some(n))));
     }
     instead.sort_by(|a, b| b.1.total_cmp(&a.1));

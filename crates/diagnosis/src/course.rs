@@ -16,20 +16,12 @@
 use dynamics::catalogue::Law;
 use nalgebra::{DMatrix, DVector};
 
+use crate::decisions::{RHO, RHO_SHAPE, TAU};
 use crate::hypothesis::{Along, CATALOGUE, Hypothesis};
 use crate::param::{P, Theta};
 use crate::problem::{Direction, Gram, Hat};
 use crate::refit::{Fit, directions};
 use crate::signal::signal;
-
-/// Standard deviation of a cause's size between drives, in its size.
-const TAU: f64 = 0.03;
-/// Standard deviation of a cause's course along a signal, in its size, where physics gives its law.
-const RHO: f64 = 0.05;
-/// The same where the law is what a maker chose or a component happens to do, and the catalogue's is
-/// one of many: a quarter more or less is still that cause. Not along a signal over which its form is
-/// fitted: form and course would be free of each other.
-const RHO_SHAPE: f64 = 0.25;
 
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
@@ -41,11 +33,13 @@ pub(crate) fn signals(p: P) -> impl Iterator<Item = (&'static str, f64)> {
     own.into_iter().flat_map(|h| h.course.iter().map(|along| (along.signal(), rho(h, along))))
 }
 
+/// Part of a cause that its form may differ by.
+pub(crate) fn form(h: &Hypothesis) -> f64 {
+    if h.of_truck().is_some_and(|c| c.law == Law::Chosen) { RHO_SHAPE } else { RHO }
+}
+
 fn rho(h: &Hypothesis, along: &Along) -> f64 {
-    match (h.of_truck().map(|c| c.law), along) {
-        (Some(Law::Chosen), Along::Open(_)) => RHO_SHAPE,
-        _ => RHO,
-    }
+    if matches!(along, Along::Open(_)) { form(h) } else { RHO }
 }
 
 /// Random effects of one size: columns of a Gram matrix (the residual is column 0).

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use crate::decisions::MIN_EVIDENCE;
 use crate::hypothesis::CATALOGUE;
-use crate::search::MIN_EVIDENCE;
 
 /// What drives would have shown of a cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]

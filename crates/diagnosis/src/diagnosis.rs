@@ -3,13 +3,13 @@
 use crate::baseline::Baseline;
 use crate::causes::{Answer, Named, causes};
 use crate::course::Point;
+use crate::decisions::{EXPLAINED, MIN_EVIDENCE};
 use crate::drive_use::{DriveRole, drive_uses};
 use crate::gain::{DriveError, gain};
 use crate::observable::observable;
 use crate::problem::Problem;
 use crate::replay::{Module, Prepared};
 use crate::report_models::Models;
-use crate::search::MIN_EVIDENCE;
 use crate::sentence;
 use crate::sure::{Sure, beyond, describe, judge};
 use crate::unknown::Shape;
@@ -53,9 +53,6 @@ pub enum Progress {
     /// Figures of the report.
     Report,
 }
-
-/// Probability above which a cause is stated as the explanation.
-const EXPLAINED: f64 = 0.95;
 
 /// Finds what the simulation of `plant` gets wrong on `drives` and names the cause.
 ///

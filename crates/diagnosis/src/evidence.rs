@@ -16,6 +16,10 @@ pub(crate) trait Evidence {
     /// How many drives there are.
     fn drives(&self) -> usize;
 
+    /// How much more drives in order scatter about the sizes of a hypothesis than their information
+    /// says; 1 where no baseline has shown it.
+    fn scatter_of(&self, hypothesis: usize) -> f64;
+
     /// Gram matrix of the residual at `theta` and the directions from `from`.
     fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram;
 
@@ -32,6 +36,10 @@ impl Evidence for Problem<'_> {
 
     fn drives(&self) -> usize {
         self.drives.len()
+    }
+
+    fn scatter_of(&self, hypothesis: usize) -> f64 {
+        self.reference.scatter.get(hypothesis).copied().unwrap_or(1.0)
     }
 
     fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram {

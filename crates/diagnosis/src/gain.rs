@@ -1,5 +1,6 @@
 //! What an extension is worth on drives that it has not seen: rollouts of 60 s before and after.
 
+use crate::decisions::STRONG_NATS;
 use crate::held_out::gains;
 use crate::param::Theta;
 use crate::problem::{Problem, replay};
@@ -109,6 +110,6 @@ pub(crate) fn gain(plant: &Plant, problem: &Problem<'_>, fit: &Fit) -> Gain {
         yaw_rate_rmse_rad_s: both(|e| e.yaw),
         fuel_error_frac: BeforeAfter { before: fuel(&before), after: fuel(&after) },
         log_score_nats: total,
-        significant: total > 3.0 && gains.iter().all(|g| *g > -3.0),
+        significant: total > STRONG_NATS && gains.iter().all(|g| *g > -STRONG_NATS),
     }
 }

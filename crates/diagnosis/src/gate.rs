@@ -3,28 +3,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::decisions::{
+    DISPERSION_PRIOR, LONELY, MIN_SIGMAS, OWN_SIZES, OWN_SIZES_PART, SHARED, STRONG_NATS, WORTH,
+};
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::problem::Direction;
 use crate::refit::{Fit, prior};
 use crate::stats::evidence;
-
-/// Sigmas by which a size must differ from nothing, once the drives' disagreement counts.
-const MIN_SIGMAS: f64 = 2.6;
-/// How many drives' worth the expectation counts that drives scatter as their information says.
-const DISPERSION_PRIOR: f64 = 4.0;
-
-/// Evidence, and part of a size's evidence, that sizes of the drives' own may add before the drives
-/// disagree.
-const OWN_SIZES: f64 = 6.0;
-const OWN_SIZES_PART: f64 = 0.15;
-
-/// Part of the smallest size worth a word below which a cause is dropped.
-const WORTH: f64 = 0.5;
-/// Part of the gain expected of all drives but the best below which a cause is of one drive.
-const SHARED: f64 = 0.5;
-/// Part of the information about a cause in one drive above which no other drive can confirm it.
-const LONELY: f64 = 0.85;
 
 /// Information of every drive about a member's sizes, in their priors: what it says of the cause as the
 /// catalogue has it, which a course of its own would cap.
@@ -54,7 +40,7 @@ impl dyn Evidence + '_ {
     }
 
     /// Over-dispersion of the drives about every free parameter.
-    fn dispersions(&self, fit: &Fit) -> Vec<f64> {
+    pub(crate) fn dispersions(&self, fit: &Fit) -> Vec<f64> {
         let (k, drives) = (fit.free.len(), fit.gram.per_drive.len() as f64);
         let (mut seen, mut expected) = (vec![0.0; k], vec![0.0; k]);
         for (g, score) in fit.gram.per_drive.iter().zip(self.pulls(fit)) {
@@ -75,18 +61,6 @@ impl dyn Evidence + '_ {
                 ((DISPERSION_PRIOR + ratio) / freedom).max(0.8)
             })
             .collect()
-    }
-
-    /// What `nats` of the `i`-th member are worth beside another cause. Drives in order have not shown
-    /// how what is left beside that one scatters, so that it is known from these few drives alone:
-    /// Student's t with the over-dispersion of the member's sizes,
-    /// `n/2 ln(1 + 2 nats / (n phi))` of `n` degrees of freedom, which is `nats / phi` for many.
-    pub(crate) fn beside(&self, fit: &Fit, member: usize, nats: f64) -> f64 {
-        let freedom = self.drives() as f64 - 1.0 + DISPERSION_PRIOR;
-        let sizes = CATALOGUE[fit.set[member]].sizes;
-        let all = fit.free.iter().zip(self.dispersions(fit));
-        let most = all.filter(|(p, _)| sizes.contains(p)).map(|x| x.1).fold(1.0, f64::max);
-        0.5 * freedom * (2.0 * nats.max(0.0) / (freedom * most)).ln_1p()
     }
 
     /// Gradient of every drive at the fit, less its part of the prior's.
@@ -150,7 +124,7 @@ impl dyn Evidence + '_ {
             let (set, theta) = self.without(&fit, i);
             let Some(fewer) = self.fit(&set, &theta, empty.norm) else { return empty.clone() };
             let weather = hyp.nonlinear() && Self::from_one_drive(&fit, i, &fewer);
-            if small || weather || self.folds(&fit, i) < 3.0 {
+            if small || weather || self.folds(&fit, i) < STRONG_NATS {
                 fit = fewer;
                 i = 0;
             } else {

@@ -1,12 +1,9 @@
 //! Causes against drives that the search has not seen.
 
+use crate::decisions::{MIN_EVIDENCE, STRONG_NATS};
 use crate::evidence::Evidence;
 use crate::param::Theta;
 use crate::refit::Fit;
-use crate::search::MIN_EVIDENCE;
-
-/// Nats that drives held out must lose by a cause before they speak against it.
-const AGAINST: f64 = 3.0;
 
 /// Score of every drive at `theta`, nats: the whitened residual that its tolerances cannot take.
 fn scores(held: &dyn Evidence, theta: &Theta) -> Vec<f64> {
@@ -46,7 +43,7 @@ impl dyn Evidence + '_ {
                 };
                 let Some(less) = less else { continue };
                 let gain: f64 = gains(held, &less.theta, &fit.theta).iter().sum();
-                if gain > -AGAINST {
+                if gain > -STRONG_NATS {
                     continue;
                 }
                 let total = fit.log_z - less.log_z + gain;

@@ -24,7 +24,7 @@
 //! | causes | `hypothesis`, `param`, `sentence`; physics and words stand in `dynamics::catalogue` |
 //! | replay | `plant`, `replay`, `signal`, `parts` |
 //! | problem | `problem`, `course`, `baseline`, `stats` |
-//! | search | `evidence`, `screen`, `fit`, `refit`, `search`, `gate`, `held_out`, `weights` |
+//! | search | `decisions`, `evidence`, `screen`, `fit`, `refit`, `search`, `gate`, `held_out`, `worth`, `weights` |
 //! | outside the catalogue | `unknown`, `catch_all`, `sure` |
 //! | answer | `diagnosis`, `causes`, `wrong`, `observable`, `detectable`, `gain`, `verdict`, `overlay` |
 //! | run | `outcome`, `report`, `drive_use`, `table_trial`, `executor` |
@@ -37,6 +37,7 @@ mod causes;
 mod channel;
 pub mod clock;
 mod course;
+mod decisions;
 mod detectable;
 mod diagnosis;
 mod drive;
@@ -82,6 +83,7 @@ mod unknown;
 mod verdict;
 mod weights;
 mod whole_run;
+mod worth;
 mod wrong;
 
 pub use baseline::Baseline;

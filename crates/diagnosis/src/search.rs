@@ -6,21 +6,15 @@
 //! cause, ten for a further one. What a helper would patch of the form of a large cause is in the
 //! score already ([`crate::course`]).
 
+use crate::decisions::{HOPELESS, MIN_EVIDENCE, MIN_FIRST};
 use crate::evidence::Evidence;
 use crate::hypothesis::{CATALOGUE, Hypothesis};
 use crate::param::{PARAMS, Spec, Theta};
 use crate::refit::Fit;
 use crate::screen::{Candidate, Screen, outside};
 
-/// Least evidence for a first cause, nats. Drives in order reach it with one of the catalogue's
-/// causes once in some hundred times.
-const MIN_FIRST: f64 = 6.0;
-/// Least evidence for another cause, and for a first one that has a rival, nats.
-pub(crate) const MIN_EVIDENCE: f64 = 10.0;
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
-/// Evidence of a free function over that of causes above which these are searched no further.
-const HOPELESS: f64 = 2.0;
 /// Pairs refitted.
 const PAIRS: usize = 3;
 

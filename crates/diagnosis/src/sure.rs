@@ -4,41 +4,16 @@
 use crate::Unknown;
 use crate::catch_all::Left;
 use crate::course::Point;
+use crate::decisions::{
+    ACCOUNTED, AHEAD, BESIDE, CATCH_ALL, CATCH_ALL_PART, CROWD, FOLLOWS, FREE_FORM_TIMES, MISFIT,
+    REPLACED_MANY, UNKNOWN_EVIDENCE,
+};
 use crate::hypothesis::CATALOGUE;
 use crate::problem::Problem;
 use crate::refit::Fit;
 use crate::replay::Module;
 use crate::sentence;
 use crate::unknown::{Acts, Restless, Shape};
-
-/// Evidence that a free function needs beside or instead of named causes, nats.
-const UNKNOWN_EVIDENCE: f64 = 30.0;
-
-/// Part of the evidence of one cause, and of several in the same module, above which a free function
-/// replaces them if they leave much over.
-const REPLACED_ONE: f64 = 1.0;
-const REPLACED_MANY: f64 = 0.5;
-
-/// Evidence of the causes and of the best free function that is left beside them, in that of the
-/// best one without causes, above which they are about different things: both are stated.
-const BESIDE: f64 = 1.5;
-
-/// Part of the evidence of the best free function that may be left beside causes that account for
-/// it: a function takes a steady force along, which tolerances and their means share with a cause.
-const ACCOUNTED: f64 = 0.2;
-
-/// Variance over that of drives in order, in a module that a cause explains, above which the cause
-/// is not sure.
-const MISFIT: f64 = 1.2;
-
-/// Evidence, and part of the causes' evidence, that a force without a name may add before causes of
-/// the force balance are not sure.
-const CATCH_ALL: f64 = 4.0;
-const CATCH_ALL_PART: f64 = 0.05;
-
-/// Part of the excess of a module below which a function of a signal does not describe what is
-/// left: noise that comes and goes gives every signal something.
-const FOLLOWS: f64 = 0.05;
 
 /// Modules whose replay reads what another one measures: speed is read by all, torque and pressure by
 /// the force balance, torque by the fuel, the yaw rate by heading and trailer.
@@ -103,13 +78,13 @@ fn against_functions(
         && bare.first().is_none_or(|s| s.module != random.module || s.explained_frac < FOLLOWS)
     {
         let left = apart(problem, empty, &fit, random.module);
-        if random.evidence > 1.15 * (fit.log_z - left.log_z) {
+        if random.evidence > AHEAD * (fit.log_z - left.log_z) {
             return (left, Some(noise(&random)), Sure::Outside);
         }
     }
     let rest = if fit.set.is_empty() { bare.to_vec() } else { beyond(problem, &Point::of(&fit)) };
     let left = rest.first().map_or(0.0, |s| s.firm);
-    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > 1.15 * fit.log_z {
+    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > AHEAD * fit.log_z {
         let best_rest = rest.first().map_or(0.0, |s| s.log_z);
         if !fit.set.is_empty() && fit.log_z + best_rest > BESIDE * best_bare {
             return (fit, describe(&rest), Sure::Outside);
@@ -122,7 +97,7 @@ fn against_functions(
     if left > UNKNOWN_EVIDENCE {
         let share = rest.first().map_or(0, |s| sharing(&fit, s.module));
         // Causes that leave much and that one free function replaces stand in for it.
-        let replaced = if share > 1 { REPLACED_MANY } else { REPLACED_ONE };
+        let replaced = if share > 1 { REPLACED_MANY } else { 1.0 };
         if share > 0 && best_bare > replaced * fit.log_z {
             return (elsewhere(problem, empty, &fit, bare), describe(bare), Sure::Outside);
         }
@@ -180,7 +155,7 @@ pub(crate) fn beyond(problem: &Problem<'_>, at: &Point) -> Vec<Shape> {
     for s in &mut shapes {
         let usual = problem.reference.free_form[s.module as usize].max(0.0);
         let agreed = if s.log_z > 0.0 { (s.firm / s.log_z).clamp(0.0, 1.0) } else { 1.0 };
-        s.log_z -= 3.0 * drives * usual;
+        s.log_z -= FREE_FORM_TIMES * drives * usual;
         s.firm = agreed * s.log_z;
     }
     shapes.sort_by(|a, b| b.log_z.total_cmp(&a.log_z));
@@ -205,7 +180,7 @@ fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
     let strained = Module::ALL.into_iter().any(|m| {
         let share = sharing(fit, m);
         let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
-        share >= 3 || (share > 0 && excess > MISFIT)
+        share >= CROWD || (share > 0 && excess > MISFIT)
     });
     let zero = &problem.reference.theta;
     strained || fit.set.iter().any(|h| CATALOGUE[*h].is_at_bound(&fit.theta, zero))

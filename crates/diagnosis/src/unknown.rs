@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::course::Point;
+use crate::decisions::{FACTOR, FUNCTION_DISPERSION_PRIOR, RESTLESS, RESTLESS_ALONE};
 use crate::problem::{Problem, Rest};
 use crate::replay::{Module, Prepared};
 use crate::signal::{SIGNALS, Signal, means};
@@ -80,19 +81,12 @@ const LEAST_ROWS: f64 = 50.0;
 /// of that factor: an addition that follows a slow signal shows a factor poorly, for it has to be
 /// large where the quantity is large.
 const SCALED: &[Module] = &[Module::Torque, Module::Fuel, Module::Brake, Module::Gps, Module::Co2];
-const FACTOR: f64 = 0.05;
 const SLOW: &[&str] = &["time_s", "ambient_temp_degc", "coolant_temp_degc", "gps_altitude_m"];
 
 /// Signals that the module itself writes, which its own noise would imitate.
 fn own(module: Module, signal: &str) -> bool {
     module.quantity() == signal && module != Module::Force
 }
-
-/// How many drives' worth the expectation counts that drives scatter as their noise says.
-const DISPERSION_PRIOR: f64 = 2.0;
-
-/// Excess of the whitened variance over drives in order that no tolerance explains.
-const RESTLESS: f64 = 1.1;
 
 /// Means of a channel over rows of `step` samples.
 fn means_of(x: &[f64], step: usize) -> Vec<f64> {
@@ -109,8 +103,8 @@ fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
 
 /// How much more the drives disagree about a free function than their noise says, at least 1: the
 /// ratio of their score contributions to the expected ones, drawn towards one by
-/// [`DISPERSION_PRIOR`] drives' worth. Bursts of model error (a hard stop) are not white noise, and
-/// evidence counts for less by this factor.
+/// [`FUNCTION_DISPERSION_PRIOR`] drives' worth. Bursts of model error (a hard stop) are not white
+/// noise, and evidence counts for less by this factor.
 pub(crate) fn dispersion(
     systems: &[(DMatrix<f64>, DVector<f64>)],
     a: &DMatrix<f64>,
@@ -125,7 +119,7 @@ pub(crate) fn dispersion(
         expected += (a * &inverse).trace();
     }
     let ratio = drives * seen / f64::max(expected, 1e-9);
-    Some(((DISPERSION_PRIOR + ratio) / (DISPERSION_PRIOR + drives)).max(1.0))
+    Some(((FUNCTION_DISPERSION_PRIOR + ratio) / (FUNCTION_DISPERSION_PRIOR + drives)).max(1.0))
 }
 
 impl Problem<'_> {
@@ -144,7 +138,7 @@ impl Problem<'_> {
             .filter(|m| {
                 let own = excess(*m);
                 SEARCHED.iter().any(|s| s.0 == *m)
-                    && (own > 2.0
+                    && (own > RESTLESS_ALONE
                         || gusts && *m == Module::Yaw
                         || gusts && *m == Module::TrailerYaw)
             })

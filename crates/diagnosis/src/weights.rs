@@ -11,13 +11,7 @@
 //! cause's part of the balance and follow a signal. One beside the causes is judged before
 //! ([`crate::sure`]).
 
-/// Probability that a cause of the catalogue is there before any drive is seen: with 37 causes, one
-/// truck in six has one.
-pub(crate) const PRIOR_CAUSE: f64 = 0.005;
-
-/// Probability that a free function is there: of some two hundred that are tried one, in one truck in
-/// a hundred.
-const PRIOR_FUNCTION: f64 = 5e-5;
+use crate::decisions::{PRIOR_CAUSE, PRIOR_FUNCTION};
 
 /// Log odds of a prior probability.
 fn log_odds(p: f64) -> f64 {
@@ -33,6 +27,22 @@ pub(crate) struct Weighed {
     pub(crate) function: Option<usize>,
     /// Log evidence, nats, from whatever level is common to all.
     pub(crate) log_z: f64,
+}
+
+/// The sets of `models` with each of the functions that are left beside what was found, numbered from 0,
+/// which add `firm` nats. What is left says nothing about which of the causes are there: it stands beside
+/// every set alike. Beside the found one alone it would make all of its members certain.
+pub(crate) fn beside(models: &[Weighed], firm: &[f64]) -> Vec<Weighed> {
+    let sets = models.iter().filter(|m| m.function.is_none());
+    let with = |m: &Weighed| -> Vec<Weighed> {
+        let one = |(n, nats): (usize, &f64)| Weighed {
+            causes: m.causes.clone(),
+            function: Some(n),
+            log_z: m.log_z + nats,
+        };
+        firm.iter().enumerate().map(one).collect()
+    };
+    sets.flat_map(with).collect()
 }
 
 /// Weights of models, in their order; they add up to one. The same set under two shapes counts once,
@@ -110,6 +120,27 @@ mod tests {
         assert!(p(-5.0) > 0.9999 && p(1.0) > 0.95 && p(3.0) < 0.9 && p(10.0) < 0.01);
         let models = [model(&["a"], 40.0), function(0, 42.0), function(1, 42.0)];
         assert!(of(&models, "a") < p(2.0));
+    }
+
+    /// A helper was certain as soon as a function of 20 nats was left beside the set: only the whole set
+    /// had it.
+    #[test]
+    fn a_function_beside_the_causes_says_nothing_about_which_of_them_are_there() {
+        let sets =
+            [model(&[], 0.0), model(&["a", "b"], 63.0), model(&["a"], 60.0), model(&["c"], 59.0)];
+        let mut with = sets.to_vec();
+        with.extend(beside(&sets, &[20.0, 35.0]));
+        assert_eq!(with.len(), 12);
+        for id in ["a", "b", "c"] {
+            let (less, more) = (of(&sets, id), of(&with, id));
+            assert!((less - more).abs() < 1e-9, "{id}: {less} {more}");
+        }
+        assert!(of(&with, "b") < 0.1);
+        // A function in the place of a cause competes with what stands beside it.
+        let instead = Weighed { causes: Vec::new(), function: Some(2), log_z: 75.0 };
+        let alone = [&sets[..], core::slice::from_ref(&instead)].concat();
+        let both = [&with[..], core::slice::from_ref(&instead)].concat();
+        assert!(of(&alone, "a") < 0.1 && of(&both, "a") > 0.6);
     }
 
     #[test]

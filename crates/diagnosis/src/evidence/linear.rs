@@ -23,12 +23,14 @@ pub(crate) struct LinearDrive {
 /// Drives given as matrices.
 pub(crate) struct LinearProblem {
     pub(crate) drives: Vec<LinearDrive>,
+    /// Over-dispersion of drives in order about any cause.
+    pub(crate) scatter: f64,
     zero: Theta,
 }
 
 impl LinearProblem {
     pub(crate) fn new(drives: Vec<LinearDrive>) -> Self {
-        Self { drives, zero: [0.0; PARAMS] }
+        Self { drives, scatter: 1.0, zero: [0.0; PARAMS] }
     }
 
     /// Index of a cause.
@@ -87,6 +89,10 @@ impl Evidence for LinearProblem {
 
     fn drives(&self) -> usize {
         self.drives.len()
+    }
+
+    fn scatter_of(&self, _: usize) -> f64 {
+        self.scatter
     }
 
     fn gram_along(&self, theta: &Theta, _: &Theta, directions: &[Direction]) -> Gram {

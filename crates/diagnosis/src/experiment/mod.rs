@@ -16,11 +16,11 @@ mod planned;
 
 use serde::Serialize;
 
+use crate::decisions::MIN_EVIDENCE;
 use crate::hypothesis::CATALOGUE;
 use crate::logger::Draw;
 use crate::problem::{Problem, Reference};
 use crate::replay::Prepared;
-use crate::search::MIN_EVIDENCE;
 use crate::{Channel, DiagnosisError, Drive, DriveSet, Executor, Plant, collect};
 use dynamics::TruckParameters;
 use expect::{Information, Sensitivities};

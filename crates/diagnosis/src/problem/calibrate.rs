@@ -5,20 +5,13 @@ use nalgebra::{DMatrix, DVector};
 use super::nuisance::Changed;
 use super::{Direction, Problem, Reference, nuisance_directions, replay};
 use crate::DiagnosisError;
+use crate::decisions::{FREE_FORM_NATS, MEAN_PRIOR, SCATTER_PRIOR};
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, PARAMS, SPECS, Theta};
 use crate::replay::{MODULES, Module, Prepared, Residuals};
 use crate::stats::whiten::Whitener;
 
-/// Drives' worth of the expected scatter that the baseline has to outweigh, and rounds of the
-/// iteration.
-const SCATTER_PRIOR: f64 = 2.0;
-/// Spread of a tolerance's mean, in its scatter.
-const MEAN_PRIOR: f64 = 0.7;
 const SCATTER_ROUNDS: usize = 25;
-/// Evidence of a free function that a drive in order may have, nats, where no baseline says how much:
-/// a third of the most that one of another simulator had.
-const FREE_FORM_NATS: f64 = 12.0;
 /// Times that tolerances are moved to where their drives have them.
 const RECENTRED: usize = 2;
 
@@ -42,6 +35,7 @@ impl Reference {
             whiteners,
             ratio: [1.0; MODULES],
             settled: [1.0; MODULES],
+            scatter: Vec::new(),
             free_form: [if clean { 0.0 } else { FREE_FORM_NATS }; MODULES],
         }
     }

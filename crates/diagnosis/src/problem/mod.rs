@@ -45,6 +45,9 @@ pub(crate) struct Reference {
     pub(crate) settled: [f64; MODULES],
     /// Evidence of the best free function per module on drives that are in order, nats per drive.
     pub(crate) free_form: [f64; MODULES],
+    /// How much more drives in order scatter about the sizes of every hypothesis than their information
+    /// says; empty where no baseline has shown it.
+    pub(crate) scatter: Vec<f64>,
 }
 
 /// Times that the noise is learned: each needs the tolerances of the one before.
@@ -126,6 +129,7 @@ impl<'a> Problem<'a> {
             // What the baseline calls the mean is known up to its own scatter.
             problem.reference.mean_spread = [(1.0 / problem.drives.len() as f64).sqrt(); PARAMS];
             problem.rebuild(Changed::Scatter)?;
+            problem.reference.scatter = problem.evidence().scatter_in_order();
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
             let bare = Point::bare(problem.reference.theta);
             problem.reference.settled = problem.settled(&bare);

@@ -214,7 +214,8 @@ fn what_stands_beside_a_cause_is_worth_what_few_drives_can_say() {
         let both = evidence.fit(&set, &zero, norm).unwrap();
         let one = evidence.fit(&set[..1], &zero, norm).unwrap();
         let nats = both.log_z - one.log_z;
-        (nats, evidence.beside(&both, 1, nats), evidence.beside(&both, 1, 1e4))
+        let of = |nats| evidence.worth(&both, 1, &[2e4, nats]);
+        (nats, of(nats), of(1e4))
     };
     let (nats, agreed, much) = worth([0.06; 6]);
     assert!((9.0..13.0).contains(&nats), "{nats}");
@@ -222,4 +223,59 @@ fn what_stands_beside_a_cause_is_worth_what_few_drives_can_say() {
     assert!(much > 20.0, "{much}");
     let (nats, contradicted, _) = worth([0.13, -0.01, 0.13, -0.01, 0.13, -0.01]);
     assert!(nats > 9.0 && contradicted < 0.8 * agreed, "{nats} {contradicted} {agreed}");
+}
+
+/// A cause that is 25 % off in its form may look like any other that shows where it does: what a little
+/// of one adds beside it is worth little, what is far more than that stays, and so does what shows
+/// elsewhere. What the strongest is worth its form says nothing about.
+#[test]
+fn what_the_form_of_a_stronger_cause_may_look_like_is_worth_little() {
+    const FRICTION: &str = "engine_friction";
+    let columns = [
+        (P::Friction, times(&wave(1), 100.0)),
+        (P::Drag, times(&wave(2), STRONG)),
+        (P::YawBias, times(&wave(3), 1_000.0)),
+    ];
+    let worth = |name: &str, p: P, size: f64| {
+        let own = &columns.iter().find(|c| c.0 == p).unwrap().1;
+        let residual = plus(&times(&columns[0].1, 0.4), &times(own, size));
+        let problem = alike(6, &residual, &columns);
+        let evidence: &dyn Evidence = &problem;
+        let set = [FRICTION, name].map(LinearProblem::cause);
+        let zero = [0.0; PARAMS];
+        let norm = evidence.gram(&zero, &[]).total().2;
+        let both = evidence.fit(&set, &zero, norm).unwrap();
+        let alone = |i: usize| evidence.fit(&[set[1 - i]], &zero, norm).unwrap();
+        let nats = [0, 1].map(|i| both.log_z - alone(i).log_z);
+        (nats, [0, 1].map(|i| evidence.worth(&both, i, &nats)))
+    };
+    let (nats, [main, patch]) = worth(DRAG, P::Drag, 0.1);
+    assert!(nats[1] > 15.0 && patch < 3.0, "{nats:?} {patch}");
+    assert!((main - nats[0]).abs() < 1e-9);
+    let (nats, [_, large]) = worth(DRAG, P::Drag, 0.8);
+    assert!(large > 10.0, "{nats:?} {large}");
+    let (nats, [_, elsewhere]) = worth("yaw_rate_bias", P::YawBias, 0.01);
+    assert!(nats[1] > 15.0 && elsewhere > 6.0, "{nats:?} {elsewhere}");
+}
+
+/// Noise that remembers longer than its filter scatters the drives about every size: drives in order say
+/// by how much, and evidence counts for less by that, of a lone cause too.
+#[test]
+fn what_drives_in_order_scatter_about_a_cause_takes_from_its_evidence() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let scattered = |by: f64| {
+        let pushes = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
+        let of = |push: &f64| drive(times(&wave(1), by * push), &columns);
+        let problem = LinearProblem::new(pushes.iter().map(of).collect());
+        let evidence: &dyn Evidence = &problem;
+        evidence.scatter_in_order()[LinearProblem::cause(ROLLING)]
+    };
+    // Eight drives against four drives' worth of what is expected.
+    assert!((scattered(1.0) - 1.0).abs() < 1e-9);
+    assert!((scattered(2.0) - (4.0 + 8.0 * 4.0) / 12.0).abs() < 1e-9);
+    let mut problem = alike(6, &times(&columns[0].1, 0.1), &columns);
+    problem.scatter = scattered(2.0);
+    let evidence: &dyn Evidence = &problem;
+    let (_, fit, _) = found(&problem, &[ROLLING]);
+    assert!((evidence.worth(&fit, 0, &[42.0]) - 14.0).abs() < 1e-9);
 }
