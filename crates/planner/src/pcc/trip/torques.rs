@@ -28,10 +28,10 @@ pub(super) fn settle_torques(
     let whole_frac = problem.fit_frac;
     for fit_frac in FITS_FRAC {
         problem.fit_frac = fit_frac;
-        for _ in 0..ROUNDS {
-            if !is_improved(problem, best, solver) {
-                break;
-            }
+        let rounds = (0..ROUNDS).take_while(|_| is_improved(problem, best, solver)).count();
+        // A map that does not bend: its parabola was right.
+        if rounds == 0 && fit_frac == FITS_FRAC[0] {
+            break;
         }
     }
     problem.fit_frac = whole_frac;
