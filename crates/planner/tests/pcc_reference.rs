@@ -181,10 +181,70 @@ fn campaign_against_dynamic_programming_eco_roll() {
 #[ignore = "campaign: cargo test --release -p planner --test pcc_reference -- --ignored --nocapture nobody"]
 fn campaign_on_roads_that_nobody_has_tuned_to_only_reports() {
     let roads = corpus::unseen();
-    for engine in [Engine::Longhaul, Engine::Measured] {
+    for engine in [Engine::Longhaul, Engine::Measured, Engine::MeasuredHull] {
         table(&roads, engine, &BANDS_KM_H[1..2], false);
     }
     table(&roads, Engine::Longhaul, &BANDS_KM_H[1..2], true);
+}
+
+/// A plan and its reference: fuel in the plan's time, g, and how much the wheel force changes from
+/// interval to interval, kN.
+struct Restless {
+    fuel_g: [f64; 2],
+    change_kn: [f64; 2],
+    time_s: f64,
+    beta_g_s: f64,
+}
+
+fn restless(profile: &[ProfilePoint], mass_kg: f64, engine: Engine) -> Restless {
+    let limits = truck(mass_kg, engine);
+    let trip = Trip::new(&request(profile, &limits, BANDS_KM_H[1])).unwrap();
+    let (driven, beta) = planned(&trip);
+    let task = task(&trip, &limits);
+    let time_s = driven.trip_time_s();
+    let found = dp::reference(&task, time_s, beta, dp::QUICK);
+    let plant = dp::Plant::new(&task);
+    let change_kn = |e: &[f64], gears: &[usize]| {
+        let need = |k: usize| plant.exact_edge(k, gears[k], e[k], e[k + 1]).unwrap().need;
+        let sum: f64 = (1..gears.len()).map(|k| (need(k) - need(k - 1)).abs()).sum();
+        1e-3 * mass_kg * sum / gears.len() as f64
+    };
+    let of_plan = |drive: &Drive| match drive {
+        Drive::Gear(g) => *g as usize,
+        Drive::Neutral => dp::NEUTRAL,
+    };
+    let gears: Vec<usize> = driven.drive.iter().map(of_plan).collect();
+    Restless {
+        fuel_g: [driven.total_fuel_g(), found.fuel_at(time_s)],
+        change_kn: [change_kn(&driven.e_j_kg, &gears), change_kn(&found.e, &found.gears)],
+        time_s,
+        beta_g_s: found.beta,
+    }
+}
+
+#[test]
+#[ignore = "campaign: cargo test --release -p planner --test pcc_reference -- --ignored --nocapture dents"]
+fn campaign_what_the_dents_of_the_measured_map_are_worth_only_reports() {
+    println!(
+        "| road | mass, t | plan / reference, map as read | its convex hull | reference as read / on the hull | change of force in 25 m as read, kN: plan | reference |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    for (name, profile) in corpus::unseen() {
+        for mass in MASSES_KG {
+            let read = restless(&profile, mass, Engine::Measured);
+            let hull = restless(&profile, mass, Engine::MeasuredHull);
+            let hull_g = hull.fuel_g[1] + hull.beta_g_s * (hull.time_s - read.time_s);
+            println!(
+                "| {name} | {:.0} | {:.5} | {:.5} | {:.5} | {:.2} | {:.2} |",
+                mass / 1e3,
+                read.fuel_g[0] / read.fuel_g[1],
+                hull.fuel_g[0] / hull.fuel_g[1],
+                read.fuel_g[1] / hull_g,
+                read.change_kn[0],
+                read.change_kn[1],
+            );
+        }
+    }
 }
 
 #[test]

@@ -358,3 +358,28 @@ fn figures() {
         );
     }
 }
+
+#[test]
+#[ignore = "figures for docs/results/traffic.md"]
+fn the_lane_drop_by_share_of_trucks() {
+    let seeds = 12;
+    for (trucks, limit) in [(0.0, 30.0), (0.1, 30.0), (0.2, 30.0), (0.35, 30.0), (0.2, 22.0)] {
+        let config = |per_hour| TrafficConfig { max_speed_m_s: limit, ..demand(trucks, per_hour) };
+        let served = |config: TrafficConfig, map: &LaneMap, detector_m: f64| {
+            let of = |seed| TrafficConfig { seed, ..config.clone() };
+            let all: Vec<f64> = (3..3 + seeds)
+                .map(|seed| served_1_h(of(seed), map.clone(), 1800.0, detector_m))
+                .collect();
+            mean_and_cv(&all)
+        };
+        let (flat, flat_cv) =
+            served(config(2400.0), &LaneMap::straight(2, 5000.0, 3.75, limit), 3500.0);
+        let (drop, drop_cv) = served(config(1900.0), &lane_drop(limit), 4000.0);
+        let error_pct = 100.0 * flat_cv.hypot(drop_cv) / (seeds as f64).sqrt();
+        eprintln!(
+            "trucks {trucks}, {limit} m/s, per hour and lane: flat {flat:.0}, lane drop {drop:.0}, \
+             {:.1} % (standard error {error_pct:.1})",
+            100.0 * (drop / flat - 1.0)
+        );
+    }
+}

@@ -22,6 +22,7 @@
 
 use alloc::vec::Vec;
 
+use super::fit::{FuelCosts, Parabola};
 use super::sqp::CutModel;
 use crate::pcc::model::{Course, Drive, Operating, Truck, Tuning, duration_s};
 
@@ -61,6 +62,9 @@ pub struct Linearisation<'a> {
     pub beta_g_s: f64,
     /// How part load below zero wheel force is charged.
     pub cut: CutModel,
+    /// Part of the tractions above zero wheel force, around the profile's own, over which the fuel
+    /// map is taken to be a parabola; 1: all of them.
+    pub fit_frac: f64,
 }
 
 /// One convex subproblem. Vectors are per interval unless the name says node; reused between
@@ -161,7 +165,7 @@ impl Subproblem {
         tuning: &Tuning,
         point: &Linearisation<'_>,
     ) {
-        let Linearisation { e_j_kg: e, gears, beta_g_s, cut } = *point;
+        let Linearisation { e_j_kg: e, gears, beta_g_s, cut, fit_frac } = *point;
         let (n, h) = (course.n(), course.h_m);
         self.resize(n);
         self.h_m = h;
@@ -191,7 +195,7 @@ impl Subproblem {
                 - resistance_slope * mean;
             let p = (self.a0[k] * e[k] + self.a1[k] * e[k + 1] + self.r[k]).max(0.0);
             match &around {
-                Some(around) => self.traction_and_fuel(around, k, p, cut),
+                Some(around) => self.traction_and_fuel(around, k, p, cut, fit_frac),
                 None => self.rolling(truck.idle_fuel_g_s(), k, v),
             }
             q_typical += self.q1[k];
@@ -218,7 +222,14 @@ impl Subproblem {
         self.discount[k] = LEAST_DISCOUNT * h;
     }
 
-    fn traction_and_fuel(&mut self, around: &Around<'_>, k: usize, p: f64, cut: CutModel) {
+    fn traction_and_fuel(
+        &mut self,
+        around: &Around<'_>,
+        k: usize,
+        p: f64,
+        cut: CutModel,
+        fit_frac: f64,
+    ) {
         let h = self.h_m;
         let Around { v, v_low, v_high, d_e, here, low, high } = around;
         let per_interval = |v: f64, at: &Operating<'_>, p: f64| h / v * at.fuel_charged_g_s(p);
@@ -231,19 +242,23 @@ impl Subproblem {
         // its convex part. Below zero wheel force a straight line to fuel cut-off, where
         // the true flow is zero: with a map that jumps there, its lower convex hull.
         let kink = here.overrun_m_s2().min(0.9 * phi);
-        let half = 0.5 * (phi - kink);
-        let f = [0.0, 1.0, 2.0].map(|u| per_interval(*v, here, kink + u * half));
-        let bend = (f[2] - 2.0 * f[1] + f[0]) / (half * half);
-        self.q2[k] = bend.max(0.0);
-        self.q1[k] = (f[2] - f[0]) / (2.0 * half) - self.q2[k] * (kink + half);
+        let fuel = |p: f64| per_interval(*v, here, p);
+        let Parabola { q1, q2, first_g } = Parabola::through(fuel, kink, 0.5 * (phi - kink));
         let zero = match cut {
             CutModel::Hull => 0.0,
-            CutModel::Charged => per_interval(*v, here, 0.0),
+            CutModel::Charged => fuel(0.0),
         };
-        let below = (f[0] - zero) / kink;
-        let above = self.q1[k] + self.q2[k] * kink;
-        self.kink[k] = kink;
-        self.discount[k] = (above - below).max(LEAST_DISCOUNT * above);
+        let below = (first_g - zero) / kink;
+        let mut costs = FuelCosts { q1, q2, kink, below };
+        if fit_frac < 1.0 {
+            let half = 0.5 * fit_frac * (phi - kink);
+            let hull = |p: f64| if p < kink { fuel(p).min(zero + below * p) } else { fuel(p) };
+            let first = (p - half).min(phi - 2.0 * half);
+            costs = costs.near(hull, first, half);
+        }
+        let above = costs.q1 + costs.q2 * costs.kink;
+        (self.q1[k], self.q2[k], self.kink[k]) = (costs.q1, costs.q2, costs.kink);
+        self.discount[k] = (above - costs.below).max(LEAST_DISCOUNT * above);
     }
 
     /// Leaves marked intervals (empty: none) no traction beyond the solver's interior.

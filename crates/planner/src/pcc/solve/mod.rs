@@ -3,6 +3,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `lin`, `quadratic` | the convex subproblem |
+//! | `fit` | an interval's fuel over traction: a parabola and a kink |
 //! | `solution` | what a solver returns |
 //! | `structured` | its solution by a banded interior-point method, without a library |
 //! | `programme`, `clarabel` | its solution by Clarabel |
@@ -13,6 +14,7 @@
 #[cfg(feature = "solver")]
 pub mod clarabel;
 pub(crate) mod eco_roll;
+mod fit;
 mod lin;
 #[cfg(feature = "solver")]
 mod programme;

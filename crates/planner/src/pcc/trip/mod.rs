@@ -5,10 +5,12 @@
 //! | `planner` | a request checked, sampled and solved |
 //! | `price` | what a second and a joule are worth in fuel |
 //! | `result` | what a trip's plan comes to: totals, rows, savings |
+//! | `torques` | speeds once more, where the fuel map bends |
 
 mod planner;
 mod price;
 mod result;
+mod torques;
 
 pub use planner::{Trip, TripRequest};
 pub use price::{Leg, Price};

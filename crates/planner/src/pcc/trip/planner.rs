@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use road::ProfilePoint;
 use tractrix_core::VehicleLimits;
 
+use super::torques::settle_torques;
 use crate::pcc::error::{PccError, check};
 use crate::pcc::model::{
     Course, Drive, Driven, MIN_SPEED_M_S, SpeedBand, Truck, Tuning, cruise_energies, cruise_trip,
@@ -145,6 +146,7 @@ impl Trip {
             fence_s: None,
             start_gear: None,
             cut: CutModel::Hull,
+            fit_frac: 1.0,
             forced_cut: Vec::new(),
             may_roll: Vec::new(),
         }
@@ -202,6 +204,7 @@ impl Trip {
         if self.eco_roll {
             self.open_driveline(&mut problem, &mut best, solver);
         }
+        settle_torques(&mut problem, &mut best, solver);
         match best.kept {
             Some(kept) => (self.or_cruise(kept.driven, trip_time_s, end_e), kept.profile),
             None => (self.cruise.clone(), Profile::failed(self.cruising())),
@@ -376,26 +379,26 @@ struct Guess {
 }
 
 /// A plan with what it costs.
-struct Kept {
+pub(super) struct Kept {
     cost_g: f64,
     driven: Driven,
-    profile: Profile,
+    pub(super) profile: Profile,
 }
 
 /// The best plan so far.
-struct Best<'a> {
+pub(super) struct Best<'a> {
     trip: &'a Trip,
     trip_time_s: f64,
-    kept: Option<Kept>,
+    pub(super) kept: Option<Kept>,
 }
 
 impl Best<'_> {
     /// Drives a profile and keeps it if it costs less than the best so far: fuel, and the price of
     /// time for what it is late or lies below the minimum speed, tenfold so that such a plan wins
-    /// only where there is no other.
-    fn offer(&mut self, problem: &Problem<'_>, profile: Profile) {
+    /// only where there is no other. Whether it is kept.
+    pub(super) fn offer(&mut self, problem: &Problem<'_>, profile: Profile) -> bool {
         if !matches!(profile.status, SolveStatus::Solved | SolveStatus::AlmostSolved) {
-            return;
+            return false;
         }
         let driven = drive_profile(
             problem.truck,
@@ -416,9 +419,11 @@ impl Best<'_> {
             .map(|(e, low)| h_m / libm::sqrt(2.0 * e) * (1.0 - libm::sqrt(e / low)))
             .sum();
         let cost_g = driven.total_fuel_g() + 10.0 * price * (late + slow);
-        if self.kept.as_ref().is_none_or(|kept| cost_g < kept.cost_g) {
+        let better = self.kept.as_ref().is_none_or(|kept| cost_g < kept.cost_g);
+        if better {
             self.kept = Some(Kept { cost_g, driven, profile });
         }
+        better
     }
 
     /// Energies and gears from a search in a tube around the best, if its gears are other ones.

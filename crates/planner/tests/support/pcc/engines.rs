@@ -16,6 +16,8 @@ pub(crate) enum Engine {
     /// The measured map itself, as it was read off a figure, 250 rpm slower; its flow is not convex
     /// in torque.
     Measured,
+    /// The same without its dents: at each speed the lower convex hull of its flow over torque.
+    MeasuredHull,
 }
 
 impl Engine {
@@ -33,7 +35,8 @@ impl Engine {
             }
             Self::BenchMap => p.fuel = bench_map(),
             Self::Longhaul => longhaul(p),
-            Self::Measured => p.fuel = measured(&p.friction_nm),
+            Self::Measured => p.fuel = measured(&p.friction_nm, |_, flow| flow),
+            Self::MeasuredHull => p.fuel = measured(&p.friction_nm, hull),
         }
     }
 }
@@ -84,8 +87,9 @@ fn longhaul(p: &mut PowertrainLimits) {
 }
 
 /// The measured map (`crates/dynamics/data/advisor_fc_ci330`) with friction of the truck; flow without
-/// torque from the line through the two lowest torques.
-fn measured(friction_nm: &Curve) -> FuelModel {
+/// torque from the line through the two lowest torques. `shape` makes a speed's flow, g/s, of its
+/// torques, Nm, and what was measured.
+fn measured(friction_nm: &Curve, shape: fn(&[f64], Vec<f64>) -> Vec<f64>) -> FuelModel {
     let text = include_str!("../../../../dynamics/data/advisor_fc_ci330/bsfc_map.csv");
     let rows: Vec<[f64; 3]> = text
         .lines()
@@ -103,8 +107,24 @@ fn measured(friction_nm: &Curve) -> FuelModel {
     let mut flow_g_s = Vec::new();
     for (of_speed, w) in rows.chunks(torques).zip(&rad_s) {
         let flow: Vec<f64> = of_speed.iter().map(|[_, t, bsfc]| bsfc * t * w / 3.6e6).collect();
-        flow_g_s.push(2.0 * flow[0] - flow[1]);
-        flow_g_s.extend(flow);
+        let row = core::iter::once(2.0 * flow[0] - flow[1]).chain(flow).collect();
+        flow_g_s.extend(shape(&torque_nm, row));
     }
     map(rad_s, torque_nm, flow_g_s, friction_nm.clone())
+}
+
+/// The lower convex hull of points over `x`, read at `x`.
+fn hull(x: &[f64], y: Vec<f64>) -> Vec<f64> {
+    let mut corners: Vec<usize> = Vec::new();
+    for i in 0..x.len() {
+        while let [.., a, b] = corners[..]
+            && (y[b] - y[a]) * (x[i] - x[a]) >= (y[i] - y[a]) * (x[b] - x[a])
+        {
+            corners.pop();
+        }
+        corners.push(i);
+    }
+    let of = |values: &[f64]| corners.iter().map(|&i| values[i]).collect();
+    let hull = Curve::new("hull", of(x), of(&y)).unwrap();
+    x.iter().map(|&at| hull.at(at)).collect()
 }
