@@ -75,9 +75,9 @@ def test_the_window_can_be_set_and_done_without() -> None:
 
 def test_those_far_away_can_sleep_on_an_even_road() -> None:
     def drive(**arguments: Any) -> list[bytes]:
-        env = envs(scenario="table2-dense-12.5", episode_s=300.0, **arguments)
+        env = envs(scenario="table2-dense-12.5", episode_s=400.0, **arguments)
         env.reset(seed=3)
-        return [env.step(keep())[0].tobytes() for _ in range(200)]
+        return [env.step(keep())[0].tobytes() for _ in range(300)]
 
     usual, sleepy = drive(), drive(awake_m=500.0)
     assert sleepy == drive(awake_m=500.0)
