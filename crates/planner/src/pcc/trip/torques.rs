@@ -46,9 +46,11 @@ fn is_improved(problem: &Problem<'_>, best: &mut Best<'_>, solver: &mut Solver<'
     let from = kept.profile.clone();
     let once = Iterations { most: 1, ..Iterations::TRIP };
     let to = iterate(problem, &from.e_j_kg, &from.gears, from.beta_g_s, once, solver);
-    STEPS_FRAC
-        .into_iter()
-        .fold(false, |better, part| best.offer(problem, between(&from, &to, part)) || better)
+    let mut better = false;
+    for part in STEPS_FRAC {
+        better |= best.offer(problem, between(&from, &to, part));
+    }
+    better
 }
 
 /// The profile `part` of the way from one to another of the same gears.
