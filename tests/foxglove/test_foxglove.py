@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from program import SERVER, recorded, running
+from shown import SERVER, recorded, running
 from viewer import connected
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect

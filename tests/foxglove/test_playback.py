@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from program import SERVER, played, recorded
+from shown import SERVER, played, recorded
 from viewer import Said, connected
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect

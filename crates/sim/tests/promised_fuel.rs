@@ -108,11 +108,13 @@ fn each_effect_of_a_truck_file_costs_what_the_plan_promises_within_half_a_per_ce
         ("as it is", &[], "", 0.0),
         ("no drag in bends", &[("resistance.curve_drag_coeff", 0.0)], "", -0.05),
         ("rolling by speed", &[("resistance.rolling_per_speed_s_m", 6e-5)], "", 0.08),
+        // A plan that reads the map keeps out of its way: it cost 8 % of the promise and 3 % more in
+        // the plant before plans did.
         (
             "low load",
             &[("engine.fuel.low_load_extra_frac", 0.3), ("engine.fuel.low_load_kw", 200.0)],
             "",
-            0.05,
+            0.04,
         ),
         ("dragging brake", &[("resistance.parasitic_force_n", 600.0)], "", 0.1),
         ("head wind", &[("resistance.headwind_m_s", 4.0)], "", 0.1),
