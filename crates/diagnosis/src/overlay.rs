@@ -98,6 +98,8 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("brake_delay", "delay_s") => Plus("brake.dead_time_s", 1.0),
         ("hidden_retarder", "torque_per_stage_nm") => Carry::Retarder,
         ("hidden_retarder", "force_n_per_m_s2") => Carry::BrakeDemand,
+        // A gain of the brakes, which stands for it, has no limit.
+        ("hidden_retarder", "saturation_s2_m") => Carry::Implied,
         ("hidden_retarder", "torque_nm") => Plus("driveline.hidden_retarder_torque_nm", 1.0),
         ("hidden_retarder", "start_offset_m_s") => Plus("driveline.hidden_retarder_from_m_s", 1.0),
         ("speed_scale", "scale") => Times("instruments.speed_scale_coeff"),
@@ -109,6 +111,9 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("steering_ratio", "ratio_scale") => Times("lateral.steering.ratio"),
         ("steering_offset", "offset_rad") => Plus("lateral.steering.offset_rad", 1.0),
         ("steering_free_play", "free_play_rad") => Plus("lateral.steering.free_play_rad", 1.0),
+        ("steering_free_play", "centring_1_s") => {
+            Plus("lateral.steering.free_play_centring_1_s", 1.0)
+        }
         ("steering_lag", "lag_s") => Plus("lateral.steering.lag_s", 1.0),
         // The truck file's lag carries the sum of lag and dead time.
         ("steering_lag", "pure_delay_frac") => Carry::Implied,

@@ -84,10 +84,12 @@ pub(crate) enum P {
     LiningLag,
     PayloadSpread,
     HeatCoolantLag,
+    RetarderSaturation,
+    PlayCentring,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 75;
+pub(crate) const PARAMS: usize = 77;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -215,6 +217,10 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::PayloadSpread, "gyration_squared_scale", "1", (0.25, -0.6, 0.8, 0.05), 0.0, 0.0),
     // Engine controllers take torque away over seconds to a minute.
     s(P::HeatCoolantLag, "derating_lag_s", "s", (20.0, 0.0, 120.0, 3.0), 0.0, 0.0),
+    // Half of its limit at 1 m/s² and below: retarders blend in before the service brakes.
+    s(P::RetarderSaturation, "saturation_s2_m", "s2/m", (1.0, 0.0, 10.0, 0.2), 0.0, 0.0),
+    // The wheels' self-alignment against the friction of the gear: not at all, or within seconds.
+    s(P::PlayCentring, "centring_1_s", "1/s", (0.3, 0.0, 3.0, 0.05), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -240,6 +246,8 @@ impl Spec {
                 | P::FuelLowLoad
                 | P::FuelLowOver
                 | P::RetarderFrom
+                | P::RetarderSaturation
+                | P::PlayCentring
                 | P::FadeStart
                 | P::LiningLag
                 | P::PayloadSpread

@@ -167,8 +167,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         .along(&[Open("brake_pressure_kpa")]),
     h("hidden_retarder", &[P::RetarderStage], &[], ONE, WITH_STAGE, 150.0, 1.0)
         .along(&[Open("speed_m_s"), Open("time_s")]),
-    h("hidden_retarder", &[P::RetarderBrake], &[], ONE, WITH_DEMAND, 600.0, 1.0)
-        .along(&[Open("speed_m_s"), Open("time_s")]),
+    h(
+        "hidden_retarder",
+        &[P::RetarderBrake],
+        &[P::RetarderSaturation],
+        &[[0.0, 0.0], [2.0, 0.0]],
+        WITH_DEMAND,
+        600.0,
+        1.0,
+    )
+    .along(&[Open("speed_m_s"), Open("time_s")]),
     h(
         "hidden_retarder",
         &[P::RetarderCoast],
@@ -180,7 +188,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     )
     .along(&[Open("speed_m_s"), Open("time_s")]),
     h("speed_scale", &[P::SpeedScale], &[], ONE, &[C::GpsSpeedMS], 0.004, 0.0)
-        .along(&[Open("time_s")]),
+        .along(&[Open("speed_m_s"), Open("time_s")]),
     h(
         "yaw_rate_bias",
         &[P::YawBias],
@@ -194,8 +202,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h("steering_ratio", &[P::SteerRatio], &[], ONE, STEERING, 0.02, 0.0).along(&[Open("time_s")]),
     h("steering_offset", &[P::SteerOffset], &[], ONE, STEERING, 0.015, 0.0)
         .along(&[Open("time_s")]),
-    h("steering_free_play", &[P::FreePlay], &[], ONE, STEERING, 0.015, 1.0)
-        .along(&[Open("speed_m_s")]),
+    h(
+        "steering_free_play",
+        &[P::FreePlay],
+        &[P::PlayCentring],
+        &[[0.0, 0.0], [0.2, 0.0]],
+        STEERING,
+        0.015,
+        1.0,
+    )
+    .along(&[Open("speed_m_s")]),
     h(
         "steering_lag",
         &[P::SteerLag],

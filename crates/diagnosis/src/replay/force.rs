@@ -26,6 +26,10 @@ pub(crate) const RETARDER_POWER_W: f64 = 400_000.0;
 /// Lag of such a retarder, s: at once, for nobody knows what it is.
 pub(crate) const RETARDER_LAG_S: f64 = 0.005;
 
+/// Time that a retarder without a name takes to fill with oil once it is asked for, s: some tenths of a
+/// second in hydrodynamic ones. It is what tells them from brakes, whose pressure is measured.
+const OIL_FILLS_S: f64 = 0.4;
+
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[super::Module::Force as usize];
     let model = Longitudinal::new(d, plant, t);
@@ -92,6 +96,7 @@ pub(crate) struct Longitudinal<'a> {
     heat: Option<Arc<[f64]>>,
     fan: Option<Arc<[f64]>>,
     retarder_n: Option<Arc<[f64]>>,
+    blended_m_s2: Option<Arc<[f64]>>,
     cold_left: Option<Arc<[f64]>>,
 }
 
@@ -130,6 +135,8 @@ impl<'a> Longitudinal<'a> {
             heat: (fade.0 != 0.0).then(|| lining_heat(d, plant, t, fade)),
             fan: (fan_w != 0.0).then(|| fan(d, plant, t)),
             retarder_n: retarder_n(d, plant, at(P::RetarderStage)),
+            blended_m_s2: (at(P::RetarderBrake) != 0.0)
+                .then(|| blended_m_s2(d, at(P::RetarderSaturation))),
             cold_left: (cold != 0.0 && !d.warm).then(|| cold_left(d, plant, t)),
         }
     }
@@ -178,12 +185,12 @@ impl<'a> Longitudinal<'a> {
             }
         }
         let (holding, table) = (cut::<L>(&d.holding_n, at), cut::<L>(&d.table_m_s2, at));
-        let xbr = cut::<L>(&d.xbr, at);
+        let blended: [f64; L] = self.blended_m_s2.as_ref().map_or([0.0; L], |x| *cut::<L>(x, at));
         let stage: [f64; L] = self.retarder_n.as_ref().map_or([0.0; L], |n| *cut::<L>(n, at));
         let (coasts, rotating) = (cut::<L>(&d.coasts, at), cut::<L>(&d.rotating_kg, at));
         lanes(|j| {
             let coasting = self.on_coast_n * coasts[j] * from_speed_frac(v[j], self.coast_from_m_s);
-            let retarder = stage[j] + coasting + self.on_brake_kg * xbr[j];
+            let retarder = stage[j] + coasting + self.on_brake_kg * blended[j];
             let held = service[j] + retarder + holding[j] + self.parasitic_n;
             (force[j] - held) / (self.mass_kg + rotating[j]) + table[j]
         })
@@ -288,6 +295,21 @@ fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<Arc<[f64]>> 
             });
             pad(steps, d.balance.padded)
         })
+    })
+}
+
+/// Demand of a retarder that blends in with the brakes, m/s²: grows with theirs up to a limit, and
+/// comes late as the oil fills.
+fn blended_m_s2(d: &Prepared, saturation_s2_m: f64) -> Arc<[f64]> {
+    d.profiles.get(Kind::Blended, [saturation_s2_m], || {
+        let follow = 1.0 - (-Drive::STEP_S / OIL_FILLS_S).exp();
+        let mut filled = 0.0;
+        let steps = d.balance.xbr.iter().take(d.n).map(|demand| {
+            filled +=
+                follow * (demand.max(0.0) / (1.0 + saturation_s2_m * demand.max(0.0)) - filled);
+            filled
+        });
+        pad(steps, d.balance.padded)
     })
 }
 

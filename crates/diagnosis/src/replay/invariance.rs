@@ -77,7 +77,7 @@ fn part(h: &Hypothesis, part: f64) -> (Theta, Cause) {
         let s = p.spec();
         let x = match p {
             P::StiffnessFollows | P::StiffnessFollowsMass | P::FuelLowOver => 1.0,
-            P::SteerDelay => 0.0,
+            P::SteerDelay | P::RetarderSaturation => 0.0,
             _ => part * s.prior,
         };
         theta[p as usize] = x;

@@ -1,7 +1,7 @@
 //! Tractor yaw rate, trailer yaw rate and lateral acceleration from hand wheel and speed, with the
 //! linear tractor-semitrailer model of `dynamics::lateral` at the measured speed.
 
-use dynamics::lateral::{LateralParameters, StateSpace, YawSideslip};
+use dynamics::lateral::{LateralParameters, StateSpace, SteeringParameters, YawSideslip};
 use tractrix_core::GRAVITY_M_S2;
 
 use super::Module as M;
@@ -173,6 +173,8 @@ struct RoadWheel<'a> {
     ratio: f64,
     offset: f64,
     play: f64,
+    /// Part of the way to the middle that alignment takes the gear within the play, per sample.
+    centres: f64,
     gear: f64,
     target: f64,
     angle: f64,
@@ -186,6 +188,7 @@ impl<'a> RoadWheel<'a> {
         let lag = steering.lag_s + t[P::SteerLag as usize] - dead_s;
         let ratio = steering.ratio * (1.0 + t[P::SteerRatio as usize]);
         let offset = steering.offset_rad + t[P::SteerOffset as usize];
+        let centring_1_s = steering.free_play_centring_1_s + t[P::PlayCentring as usize];
         let gear = d.steer[0];
         let target = (gear - offset) / ratio;
         let (keep, shares) = first_order_hold(lag);
@@ -197,6 +200,7 @@ impl<'a> RoadWheel<'a> {
             ratio,
             offset,
             play: 0.5 * (steering.free_play_rad + t[P::FreePlay as usize]).max(0.0),
+            centres: 1.0 - (-Drive::STEP_S * centring_1_s).exp(),
             gear,
             target,
             angle: target,
@@ -210,7 +214,9 @@ impl<'a> RoadWheel<'a> {
         } else {
             self.steer[i]
         };
-        self.gear = self.gear.clamp(wheel - self.play, wheel + self.play);
+        let (low, high) = (wheel - self.play, wheel + self.play);
+        let gear = self.gear.clamp(low, high);
+        self.gear = SteeringParameters::centred_rad(gear, self.offset, (low, high), self.centres);
         let before = self.target;
         self.target = (self.gear - self.offset) / self.ratio;
         self.angle =

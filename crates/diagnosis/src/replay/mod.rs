@@ -186,6 +186,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::RetarderBrake
         | P::RetarderCoast
         | P::RetarderFrom
+        | P::RetarderSaturation
         | P::TorqueScale
         | P::EngineBrakeScale
         | P::SpeedLag
@@ -215,6 +216,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         P::SteerRatio
         | P::SteerOffset
         | P::FreePlay
+        | P::PlayCentring
         | P::SteerLag
         | P::SteerDelay
         | P::CFront

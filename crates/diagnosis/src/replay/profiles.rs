@@ -15,6 +15,8 @@ pub(super) enum Kind {
     Fan,
     /// Force of the retarder that follows its stage, N; over what it has more.
     Retarder,
+    /// Demand that a retarder of the brakes has followed, m/s²; over its saturation.
+    Blended,
     /// Share of the cold tyres' extra that is left; over the time constant.
     Cold,
     /// Grade of the map; over its shift.

@@ -189,3 +189,50 @@ fn noise_of_the_torque_message_is_no_lag_of_the_fuel() {
     let ratio = mean_square(0.5 * Drive::STEP_S) / mean_square(0.0);
     assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
 }
+
+/// A retarder that blends in before the brakes was a brake gain of 10 %, stated as certain: in the
+/// catalogue it grew with the demand without a limit, and at once.
+#[test]
+fn a_retarder_of_the_brakes_fills_within_a_second_and_has_a_limit() {
+    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
+    let (n, begins) = (40 * 20, 10 * 20);
+    let mut drive = Drive::new("steady", 0.0, n);
+    drive.reported_mass_kg = Some(40_000.0);
+    for (channel, value) in [
+        (C::SpeedMS, 20.0),
+        (C::EngineTorquePercent, 0.0),
+        (C::EngineSpeedRpm, 1_200.0),
+        (C::Gear, 12.0),
+        (C::GradeFrac, 0.0),
+        (C::BrakePressureKpa, 0.0),
+    ] {
+        drive.set(channel, vec![value; n]);
+    }
+    let held_m_s = |demand_m_s2: f64, saturation_s2_m: f64| {
+        let mut drive = drive.clone();
+        let demand = |i| if i < begins { 0.0 } else { demand_m_s2 };
+        drive.set(C::XbrDecelMS2, (0..n).map(demand).collect());
+        let d = Prepared::new(&drive, &plant);
+        let of = |force_kg: f64| {
+            let mut theta = [0.0; PARAMS];
+            theta[P::RetarderBrake as usize] = force_kg;
+            theta[P::RetarderSaturation as usize] = saturation_s2_m;
+            let mut out = Residuals::default();
+            replay_group(&d, &plant, &theta, Group::Force, &mut out);
+            out[M::Force as usize].clone()
+        };
+        let (with, without) = (of(4_000.0), of(0.0));
+        let rows: Vec<f64> = with.iter().zip(&without).map(|(x, y)| (x - y).abs()).collect();
+        assert!(rows[..9].iter().all(|x| *x == 0.0), "{rows:?}");
+        (rows[10], rows[30])
+    };
+    let (first, full) = held_m_s(1.0, 1.0);
+    // Half of 4 kN on 40 t and what turns, for a second.
+    assert!((0.045..0.05).contains(&full), "{full} m/s");
+    // The mean of 1 - exp(-t / 0.4 s) over the first second.
+    let fills = 1.0 - 0.4 * (1.0 - (-2.5_f64).exp());
+    assert!((first / full - fills).abs() < 0.05, "{} of {fills}", first / full);
+    // Twice the demand is not twice the force: 2 / (1 + 2) of 1 / (1 + 1).
+    assert!((held_m_s(2.0, 1.0).1 / full - 4.0 / 3.0).abs() < 1e-3);
+    assert!((held_m_s(2.0, 0.0).1 / held_m_s(1.0, 0.0).1 - 2.0).abs() < 1e-3);
+}

@@ -19,6 +19,10 @@ pub struct SteeringParameters {
     /// Hand-wheel angle through which the road wheels do not move on reversal, rad, lock to lock of
     /// the play.
     pub free_play_rad: f64,
+    /// How fast the wheels' self-alignment pulls the gear within its play to where they roll straight,
+    /// per s; 0: its friction holds it.
+    #[serde(default)]
+    pub free_play_centring_1_s: f64,
     /// Hand-wheel angle that must be added to the true one to drive straight, rad: the wheels stand
     /// at `(hand wheel - offset) / ratio`.
     pub offset_rad: f64,
@@ -44,6 +48,7 @@ impl SteeringParameters {
         check("steering.ratio", self.ratio, 1.0, 60.0);
         check("steering.lag_s", self.lag_s, 0.0, 5.0);
         check("steering.free_play_rad", self.free_play_rad, 0.0, 1.0);
+        check("steering.free_play_centring_1_s", self.free_play_centring_1_s, 0.0, 100.0);
         check("steering.offset_rad", self.offset_rad, -2.0, 2.0);
         check("steering.max_wheel_rad", self.max_wheel_rad, 0.1, 40.0);
         check("steering.max_wheel_rate_rad_s", self.max_wheel_rate_rad_s, 0.1, 1e3);
@@ -75,7 +80,30 @@ impl SteeringParameters {
         } else {
             target
         };
-        SteeringState { wheel_rad: wheel, gear_rad: gear, road_wheel_rad: road_wheel }
+        let mut next =
+            SteeringState { wheel_rad: wheel, gear_rad: gear, road_wheel_rad: road_wheel };
+        if play > 0.0 && self.free_play_centring_1_s > 0.0 {
+            let part = 1.0 - libm::exp(-self.free_play_centring_1_s * dt_s);
+            next.gear_rad =
+                Self::centred_rad(gear, self.offset_rad, (wheel - play, wheel + play), part);
+            if self.lag_s <= 0.0 {
+                next.road_wheel_rad = (next.gear_rad - self.offset_rad) / self.ratio;
+            }
+        }
+        next
+    }
+
+    /// The gear, rad, once alignment has taken it this part of the way to where the wheels roll straight,
+    /// rad, or to the edge of its play (low, high, rad) on that side.
+    #[inline]
+    #[must_use]
+    pub fn centred_rad(
+        gear_rad: f64,
+        straight_rad: f64,
+        (low, high): (f64, f64),
+        part: f64,
+    ) -> f64 {
+        gear_rad + part * (straight_rad.max(low).min(high) - gear_rad)
     }
 
     /// Hand-wheel angle, rad, that holds this road-wheel angle, rad (free play at its middle).
@@ -94,6 +122,7 @@ mod tests {
             ratio: 20.0,
             lag_s: 0.08,
             free_play_rad: 0.1,
+            free_play_centring_1_s: 0.0,
             offset_rad: 0.0,
             max_wheel_rad: 10.0,
             max_wheel_rate_rad_s: 1e3,
@@ -127,6 +156,29 @@ mod tests {
         assert_eq!(within.road_wheel_rad, left.road_wheel_rad);
         let back = p.step(&within, 0.8, 0.1);
         assert!((back.road_wheel_rad - 0.85 / 20.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn alignment_pulls_the_gear_to_the_middle_or_to_the_edge_of_its_play() {
+        let p = SteeringParameters {
+            lag_s: 0.0,
+            offset_rad: 0.02,
+            free_play_centring_1_s: 0.5,
+            ..gear()
+        };
+        // Held left of the middle: e-fold in two seconds, to the edge that lies nearest to it.
+        let held = |wheel: f64, end_s: f64| {
+            let mut s = SteeringState { wheel_rad: wheel, gear_rad: wheel, road_wheel_rad: 0.0 };
+            for _ in 0..(end_s * 100.0) as usize {
+                s = p.step(&s, wheel, 0.01);
+            }
+            s
+        };
+        let edge = 0.2 - 0.05;
+        assert!((held(0.2, 2.0).gear_rad - (edge + 0.05 * (-1.0_f64).exp())).abs() < 1e-12);
+        assert!((held(0.2, 60.0).road_wheel_rad - (edge - 0.02) / 20.0).abs() < 1e-12);
+        // Where the middle lies within the play the wheels end up rolling straight.
+        assert!(held(0.05, 60.0).road_wheel_rad.abs() < 1e-12);
     }
 
     #[test]

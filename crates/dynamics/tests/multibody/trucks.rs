@@ -41,6 +41,7 @@ pub(crate) fn empty_19t() -> LateralParameters {
         steering: SteeringParameters {
             ratio: 24.0,
             lag_s: 0.08,
+            free_play_centring_1_s: 0.0,
             free_play_rad: 0.0,
             offset_rad: 0.0,
             max_wheel_rad: 16.0,
