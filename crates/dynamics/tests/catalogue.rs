@@ -100,6 +100,7 @@ fn sizes_carry_the_unit_that_the_key_ends_in() {
         ("_m_s", "m/s"),
         ("_1_m", "1/m"),
         ("_1_k", "1/K"),
+        ("_1_s", "1/s"),
         ("_frac", "1"),
         ("_coeff", "1"),
         ("_rad", "rad"),
