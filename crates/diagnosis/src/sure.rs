@@ -98,7 +98,8 @@ fn against_functions(
         let share = rest.first().map_or(0, |s| sharing(&fit, s.module));
         // Causes that leave much and that one free function replaces stand in for it.
         let replaced = if share > 1 { REPLACED_MANY } else { 1.0 };
-        if share > 0 && best_bare > replaced * fit.log_z {
+        let outdone = share > 0 && best_bare > replaced * fit.log_z;
+        if outdone && best_bare > alone(problem, empty, &fit, rest.first()) {
             return (elsewhere(problem, empty, &fit, bare), describe(bare), Sure::Outside);
         }
         let sure = match (fit.set.is_empty(), share) {
@@ -117,6 +118,23 @@ fn against_functions(
         return (fit, Some(noise(&random)), sure);
     }
     (fit, None, Sure::Yes)
+}
+
+/// Evidence once only the strongest of the causes that show where most is left stands there: a function
+/// that does not outdo it does not because something small stands beside it.
+fn alone(problem: &Problem<'_>, empty: &Fit, fit: &Fit, left: Option<&Shape>) -> f64 {
+    let Some(module) = left.map(|s| s.module) else { return fit.log_z };
+    let mut now = fit.clone();
+    while sharing(&now, module) > 1 {
+        let evidence = problem.evidence();
+        let fewer = (0..now.set.len()).filter(|i| shows(now.set[*i], module)).filter_map(|i| {
+            let (set, theta) = evidence.without(&now, i);
+            evidence.fit(&set, &theta, empty.norm)
+        });
+        let Some(best) = fewer.max_by(|a, b| a.log_z.total_cmp(&b.log_z)) else { break };
+        now = best;
+    }
+    now.log_z
 }
 
 /// The causes that do not show where the best free function wins.
