@@ -149,10 +149,20 @@ impl dyn Evidence + '_ {
         })
     }
 
-    /// A size of the `i`-th member is beyond what the drives disagree about.
+    /// A size of the `i`-th member is beyond what the drives disagree about. Its own course, which
+    /// vanishes with it, is no reason that it might be nothing.
     fn stands_out(&self, fit: &Fit, member: usize) -> bool {
-        let variances = self.variances(fit);
         let sizes = CATALOGUE[fit.set[member]].sizes;
+        let keep: Vec<usize> = (0..=fit.free.len()).collect();
+        let others = fit.course.without(sizes);
+        let Some(gram) = others.taken_out(&fit.whole, &keep, &fit.theta, self.zero()) else {
+            return false;
+        };
+        let sigma: Vec<f64> = fit.priors.iter().map(|p| p.sigma).collect();
+        let Some((covariance, _)) = evidence::posterior(&gram.total().0, &sigma) else {
+            return false;
+        };
+        let variances = self.variances(&Fit { gram, covariance, ..fit.clone() });
         fit.free.iter().zip(&variances).any(|(p, v)| {
             let x = fit.theta[*p as usize] - self.zero()[*p as usize];
             sizes.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()

@@ -86,10 +86,12 @@ pub(crate) enum P {
     HeatCoolantLag,
     RetarderSaturation,
     PlayCentring,
+    RetarderSlope,
+    RetarderSteep,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 77;
+pub(crate) const PARAMS: usize = 79;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -221,6 +223,9 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::RetarderSaturation, "saturation_s2_m", "s2/m", (1.0, 0.0, 10.0, 0.2), 0.0, 0.0),
     // The wheels' self-alignment against the friction of the gear: not at all, or within seconds.
     s(P::PlayCentring, "centring_1_s", "1/s", (0.3, 0.0, 3.0, 0.05), 0.0, 0.0),
+    s(P::RetarderSlope, "torque_downhill_nm", "Nm", (800.0, -300.0, 5000.0, 100.0), 0.0, 0.0),
+    // Beyond a descent of one per cent.
+    s(P::RetarderSteep, "steeper_offset_frac", "1", (0.006, -0.01, 0.02, 0.001), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -248,6 +253,7 @@ impl Spec {
                 | P::RetarderFrom
                 | P::RetarderSaturation
                 | P::PlayCentring
+                | P::RetarderSteep
                 | P::FadeStart
                 | P::LiningLag
                 | P::PayloadSpread
@@ -271,7 +277,7 @@ impl P {
     /// A fit moves it no farther than to the nearest of many dips: it is fitted from all of its
     /// starts.
     pub(crate) fn is_stuck(self) -> bool {
-        matches!(self, Self::RetarderFrom | Self::FanStart | Self::FadeStart)
+        matches!(self, Self::RetarderFrom | Self::RetarderSteep | Self::FanStart | Self::FadeStart)
     }
 
     /// A shape that is one of a few in truth.

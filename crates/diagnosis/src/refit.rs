@@ -298,15 +298,8 @@ impl dyn Evidence + '_ {
     /// Evidence and covariance where a fit has ended (Laplace).
     fn fitted(&self, set: &[usize], free: Free, at: Standing, zero_norm: f64) -> Option<Fit> {
         let (a, _, norm) = at.gram.total();
-        let k = free.params.len();
         let sigma: Vec<f64> = free.priors.iter().map(|p| p.sigma).collect();
-        let scaled = DMatrix::from_fn(k, k, |i, j| {
-            sigma[i] * a[(i, j)] * sigma[j] + if i == j { 1.0 } else { 0.0 }
-        });
-        let chol = scaled.cholesky()?;
-        let log_det: f64 = 2.0 * (0..k).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
-        let inverse = chol.inverse();
-        let covariance = DMatrix::from_fn(k, k, |i, j| sigma[i] * inverse[(i, j)] * sigma[j]);
+        let (covariance, log_det) = evidence::posterior(&a, &sigma)?;
         Some(Fit {
             set: set.to_vec(),
             theta: at.theta,

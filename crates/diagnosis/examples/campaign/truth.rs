@@ -63,9 +63,9 @@ fn keys((id, family): (&str, u32), size: f64, shape: &Shape) -> Vec<(&'static st
             let lost = if family == 1 { size / (1.0 + size) } else { 1.0 - (-size).exp() };
             vec![("loss_per_100_k", 0.0, 1.0, lost)]
         }
-        "hidden_retarder" => {
-            vec![("torque_nm", 0.0, 1.0, size), ("torque_per_stage_nm", 0.0, 1.0, size)]
-        }
+        "hidden_retarder" => ["torque_nm", "torque_per_stage_nm", "torque_downhill_nm"]
+            .map(|key| (key, 0.0, 1.0, size))
+            .to_vec(),
         "engine_brake_torque" => one("torque_scale", 1.0, 1.0),
         "speed_scale" | "fuel_flow_scale" | "co2_scale" => one("scale", 1.0, 1.0),
         "yaw_rate_bias" => one("bias_rad_s", 0.0, 1.0),

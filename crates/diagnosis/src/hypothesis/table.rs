@@ -187,6 +187,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         1.0,
     )
     .along(&[Open("speed_m_s"), Open("time_s")]),
+    h(
+        "hidden_retarder",
+        &[P::RetarderSlope],
+        &[P::RetarderSteep],
+        &[[-0.006, 0.0], [0.0, 0.0], [0.008, 0.0]],
+        WITH_PEDAL,
+        100.0,
+        1.0,
+    )
+    .along(&[Open("speed_m_s"), Open("time_s")]),
     h("speed_scale", &[P::SpeedScale], &[], ONE, &[C::GpsSpeedMS], 0.004, 0.0)
         .along(&[Open("speed_m_s"), Open("time_s")]),
     h(

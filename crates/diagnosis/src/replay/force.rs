@@ -4,7 +4,6 @@
 
 use std::sync::Arc;
 
-use dynamics::SUBSTEP_S;
 use dynamics::effects::brake::{BrakeParameters, friction_left_frac};
 use dynamics::effects::driveline::{from_speed_frac, with_losses_n};
 use dynamics::effects::resistance::{area_at_yaw_m2, cold_factor, drag_n, grade_n, rolling_n};
@@ -15,20 +14,12 @@ use super::brake::PA_PER_KPA;
 use super::inputs::{BLOCK, Inputs, cut, lanes, pad, scaled};
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
+use super::retarder::{blended_m_s2, downhill, retarder_n};
 use crate::param::{P, Theta};
 use crate::{Drive, Plant};
 
 /// Samples that a speed at a window's end is averaged over (two 10 Hz messages).
 pub(super) const EDGE: usize = 4;
-
-/// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
-pub(crate) const RETARDER_POWER_W: f64 = 400_000.0;
-/// Lag of such a retarder, s: at once, for nobody knows what it is.
-pub(crate) const RETARDER_LAG_S: f64 = 0.005;
-
-/// Time that a retarder without a name takes to fill with oil once it is asked for, s: some tenths of a
-/// second in hydrodynamic ones. It is what tells them from brakes, whose pressure is measured.
-const OIL_FILLS_S: f64 = 0.4;
 
 pub(super) fn residual(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[super::Module::Force as usize];
@@ -97,6 +88,8 @@ pub(crate) struct Longitudinal<'a> {
     fan: Option<Arc<[f64]>>,
     retarder_n: Option<Arc<[f64]>>,
     blended_m_s2: Option<Arc<[f64]>>,
+    on_slope_n: f64,
+    downhill: Option<Arc<[f64]>>,
     cold_left: Option<Arc<[f64]>>,
 }
 
@@ -137,6 +130,8 @@ impl<'a> Longitudinal<'a> {
             retarder_n: retarder_n(d, plant, at(P::RetarderStage)),
             blended_m_s2: (at(P::RetarderBrake) != 0.0)
                 .then(|| blended_m_s2(d, at(P::RetarderSaturation))),
+            on_slope_n: at(P::RetarderSlope) * per_prop,
+            downhill: (at(P::RetarderSlope) != 0.0).then(|| downhill(d, at(P::RetarderSteep))),
             cold_left: (cold != 0.0 && !d.warm).then(|| cold_left(d, plant, t)),
         }
     }
@@ -186,11 +181,13 @@ impl<'a> Longitudinal<'a> {
         }
         let (holding, table) = (cut::<L>(&d.holding_n, at), cut::<L>(&d.table_m_s2, at));
         let blended: [f64; L] = self.blended_m_s2.as_ref().map_or([0.0; L], |x| *cut::<L>(x, at));
+        let slope: [f64; L] = self.downhill.as_ref().map_or([0.0; L], |x| *cut::<L>(x, at));
         let stage: [f64; L] = self.retarder_n.as_ref().map_or([0.0; L], |n| *cut::<L>(n, at));
         let (coasts, rotating) = (cut::<L>(&d.coasts, at), cut::<L>(&d.rotating_kg, at));
         lanes(|j| {
             let coasting = self.on_coast_n * coasts[j] * from_speed_frac(v[j], self.coast_from_m_s);
-            let retarder = stage[j] + coasting + self.on_brake_kg * blended[j];
+            let on_slope = self.on_slope_n * slope[j];
+            let retarder = stage[j] + coasting + on_slope + self.on_brake_kg * blended[j];
             let held = service[j] + retarder + holding[j] + self.parasitic_n;
             (force[j] - held) / (self.mass_kg + rotating[j]) + table[j]
         })
@@ -271,48 +268,6 @@ fn fan(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
     })
 }
 
-/// Force of a retarder that follows its stage, N: the file's, with `extra_nm` more at the propeller
-/// shaft.
-fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<Arc<[f64]>> {
-    let mut driveline = plant.truck.driveline.clone();
-    if extra_nm != 0.0 {
-        if driveline.retarder_torque_nm == 0.0 {
-            driveline.retarder_lag_s = RETARDER_LAG_S;
-        }
-        driveline.retarder_torque_nm += extra_nm;
-        driveline.retarder_power_w = driveline.retarder_power_w.max(RETARDER_POWER_W);
-    }
-    (driveline.retarder_torque_nm != 0.0).then(|| {
-        d.profiles.get(Kind::Retarder, [extra_nm], || {
-            let substeps = (Drive::STEP_S / SUBSTEP_S).round() as usize;
-            let mut torque_nm = 0.0;
-            let steps = d.speed.iter().zip(&d.engine_brake).map(|(v, stage)| {
-                let target_nm = stage * driveline.retarder_limit_nm(*v);
-                for _ in 0..substeps {
-                    torque_nm = driveline.retarder_step_nm(torque_nm, target_nm, SUBSTEP_S);
-                }
-                driveline.shaft_force_n(torque_nm)
-            });
-            pad(steps, d.balance.padded)
-        })
-    })
-}
-
-/// Demand of a retarder that blends in with the brakes, m/s²: grows with theirs up to a limit, and
-/// comes late as the oil fills.
-fn blended_m_s2(d: &Prepared, saturation_s2_m: f64) -> Arc<[f64]> {
-    d.profiles.get(Kind::Blended, [saturation_s2_m], || {
-        let follow = 1.0 - (-Drive::STEP_S / OIL_FILLS_S).exp();
-        let mut filled = 0.0;
-        let steps = d.balance.xbr.iter().take(d.n).map(|demand| {
-            filled +=
-                follow * (demand.max(0.0) / (1.0 + saturation_s2_m * demand.max(0.0)) - filled);
-            filled
-        });
-        pad(steps, d.balance.padded)
-    })
-}
-
 /// Share of the cold tyres' extra resistance that is left.
 fn cold_left(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
     let tau = t[P::WarmupTau as usize];
@@ -343,6 +298,6 @@ impl Prepared {
 
 /// A step that rises evenly from `-width` to `width`: wholly on beyond, as a clutch is.
 #[inline]
-fn step(x: f64, width: f64) -> f64 {
+pub(super) fn step(x: f64, width: f64) -> f64 {
     (0.5 + 0.5 * x / width).clamp(0.0, 1.0)
 }

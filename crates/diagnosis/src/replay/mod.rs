@@ -15,14 +15,15 @@ mod lateral;
 mod powertrain;
 mod prepared;
 mod profiles;
+mod retarder;
 mod rows;
 mod section;
 mod sensors;
 mod smooth;
 
-pub(crate) use force::{RETARDER_LAG_S, RETARDER_POWER_W};
 pub(crate) use powertrain::{CRUISE_RPM, LOW_LOAD_FRAC};
 pub(crate) use prepared::Prepared;
+pub(crate) use retarder::{RETARDER_LAG_S, RETARDER_POWER_W};
 
 use crate::Plant;
 use crate::param::{P, PARAMS, Theta};
@@ -187,6 +188,8 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::RetarderCoast
         | P::RetarderFrom
         | P::RetarderSaturation
+        | P::RetarderSlope
+        | P::RetarderSteep
         | P::TorqueScale
         | P::EngineBrakeScale
         | P::SpeedLag

@@ -17,6 +17,8 @@ pub(super) enum Kind {
     Retarder,
     /// Demand that a retarder of the brakes has followed, m/s²; over its saturation.
     Blended,
+    /// How far a retarder that holds on descents is filled; over how steep they are.
+    Downhill,
     /// Share of the cold tyres' extra that is left; over the time constant.
     Cold,
     /// Grade of the map; over its shift.

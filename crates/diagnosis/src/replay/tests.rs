@@ -190,15 +190,13 @@ fn noise_of_the_torque_message_is_no_lag_of_the_fuel() {
     assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
 }
 
-/// A retarder that blends in before the brakes was a brake gain of 10 %, stated as certain: in the
-/// catalogue it grew with the demand without a limit, and at once.
-#[test]
-fn a_retarder_of_the_brakes_fills_within_a_second_and_has_a_limit() {
+/// What a retarder holds back in each second of a drive at 20 m/s, m/s: some channels change at `begins`.
+fn held_back(theta: &[(P, f64)], begins: usize, changes: &[(C, f64, f64)]) -> Vec<f64> {
     let truck = TruckParameters::load("reference").unwrap();
     let plant = Plant::of_truck(&truck).unwrap();
     let gear = truck.driveline.gear_ratios.len() as u8 - 1;
     let rpm = truck.driveline.engine_speed_rad_s(20.0, gear) * RPM_PER_RAD_S;
-    let (n, begins) = (40 * 20, 10 * 20);
+    let n = 40 * 20;
     let mut drive = Drive::new("steady", 0.0, n);
     drive.reported_mass_kg = Some(40_000.0);
     for (channel, value) in [
@@ -214,21 +212,29 @@ fn a_retarder_of_the_brakes_fills_within_a_second_and_has_a_limit() {
     ] {
         drive.set(channel, vec![value; n]);
     }
+    for (channel, before, after) in changes {
+        let at = |i| if i < begins { *before } else { *after };
+        drive.set(*channel, (0..n).map(at).collect());
+    }
+    let d = Prepared::new(&drive, &plant);
+    let of = |theta: &Theta| {
+        let mut out = Residuals::default();
+        replay_group(&d, &plant, theta, Group::Force, &mut out);
+        out[M::Force as usize].clone()
+    };
+    let mut with = [0.0; PARAMS];
+    theta.iter().for_each(|(p, x)| with[*p as usize] = *x);
+    let (with, without) = (of(&with), of(&[0.0; PARAMS]));
+    with.iter().zip(&without).map(|(x, y)| (x - y).abs()).collect()
+}
+
+/// A retarder that blends in before the brakes was a brake gain of 10 %, stated as certain: in the
+/// catalogue it grew with the demand without a limit, and at once.
+#[test]
+fn a_retarder_of_the_brakes_fills_within_a_second_and_has_a_limit() {
     let held_m_s = |demand_m_s2: f64, saturation_s2_m: f64| {
-        let mut drive = drive.clone();
-        let demand = |i| if i < begins { 0.0 } else { demand_m_s2 };
-        drive.set(C::XbrDecelMS2, (0..n).map(demand).collect());
-        let d = Prepared::new(&drive, &plant);
-        let of = |force_kg: f64| {
-            let mut theta = [0.0; PARAMS];
-            theta[P::RetarderBrake as usize] = force_kg;
-            theta[P::RetarderSaturation as usize] = saturation_s2_m;
-            let mut out = Residuals::default();
-            replay_group(&d, &plant, &theta, Group::Force, &mut out);
-            out[M::Force as usize].clone()
-        };
-        let (with, without) = (of(4_000.0), of(0.0));
-        let rows: Vec<f64> = with.iter().zip(&without).map(|(x, y)| (x - y).abs()).collect();
+        let theta = [(P::RetarderBrake, 4_000.0), (P::RetarderSaturation, saturation_s2_m)];
+        let rows = held_back(&theta, 10 * 20, &[(C::XbrDecelMS2, 0.0, demand_m_s2)]);
         assert!(rows[..9].iter().all(|x| *x == 0.0), "{rows:?}");
         (rows[10], rows[30])
     };
@@ -242,4 +248,23 @@ fn a_retarder_of_the_brakes_fills_within_a_second_and_has_a_limit() {
     // Twice the demand is not twice the force: 2 / (1 + 2) of 1 / (1 + 1).
     assert!((held_m_s(2.0, 1.0).1 / full - 4.0 / 3.0).abs() < 1e-3);
     assert!((held_m_s(2.0, 0.0).1 / held_m_s(1.0, 0.0).1 - 2.0).abs() < 1e-3);
+}
+
+/// A retarder that holds a truck on descents, and not where it rolls out on the level, had no name.
+#[test]
+fn a_retarder_of_descents_holds_there_and_with_a_released_pedal_alone() {
+    let truck = TruckParameters::load("reference").unwrap();
+    let full_m_s = truck.driveline.shaft_force_n(800.0) / 40_000.0;
+    let downhill = |grade: f64, pedal: f64, steeper: f64| {
+        let changes = [(C::GradeFrac, 0.0, grade), (C::AcceleratorPedalFrac, 0.0, pedal)];
+        let theta = [(P::RetarderSlope, 800.0), (P::RetarderSteep, steeper)];
+        held_back(&theta, 10 * 20, &changes)
+    };
+    let held = downhill(-0.03, 0.0, 0.0);
+    assert!(held[..9].iter().all(|x| *x == 0.0), "{held:?}");
+    assert!((0.9..1.0).contains(&(held[30] / full_m_s)), "{} of {full_m_s}", held[30]);
+    for (grade, pedal, steeper) in [(-0.03, 0.3, 0.0), (0.03, 0.0, 0.0), (-0.015, 0.0, 0.01)] {
+        let held = downhill(grade, pedal, steeper);
+        assert!(held.iter().all(|x| *x == 0.0), "{grade} {pedal} {steeper}: {held:?}");
+    }
 }

@@ -24,6 +24,17 @@ pub(crate) fn linear(
     Some((log_z, x.component_mul(&d)))
 }
 
+/// Covariance `(A + P^-1)^-1` and `log|I + P A|`; `None` if the system is not positive definite.
+pub(crate) fn posterior(a: &DMatrix<f64>, prior_sigma: &[f64]) -> Option<(DMatrix<f64>, f64)> {
+    let (n, d) = (prior_sigma.len(), prior_sigma);
+    let scaled =
+        DMatrix::from_fn(n, n, |i, j| d[i] * a[(i, j)] * d[j] + if i == j { 1.0 } else { 0.0 });
+    let chol = scaled.cholesky()?;
+    let log_det: f64 = 2.0 * (0..n).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
+    let inverse = chol.inverse();
+    Some((DMatrix::from_fn(n, n, |i, j| d[i] * inverse[(i, j)] * d[j]), log_det))
+}
+
 /// Rows and columns `keep` of a matrix.
 pub(crate) fn sub(a: &DMatrix<f64>, keep: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(keep.len(), keep.len(), |i, j| a[(keep[i], keep[j])])
