@@ -14,7 +14,7 @@
 use crate::decisions::{PRIOR_CAUSE, PRIOR_FUNCTION};
 
 /// Log odds of a prior probability.
-fn log_odds(p: f64) -> f64 {
+pub(crate) fn log_odds(p: f64) -> f64 {
     (p / (1.0 - p)).ln()
 }
 
