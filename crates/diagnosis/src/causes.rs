@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::course::{Point, signals};
 use crate::decisions::{LISTED_NATS, STRONG_NATS};
+use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::problem::Problem;
 use crate::refit::Fit;
@@ -130,18 +131,8 @@ pub(crate) fn causes(
     let mut compared = Compared { problem, fit, empty, models: Vec::new(), functions: left };
     compared.model(ids(&fit.set), fit.log_z);
     compared.model(Vec::new(), 0.0);
-    let without: Vec<Option<Fit>> = (0..fit.set.len())
-        .map(|i| {
-            let (fewer, theta) = evidence.without(fit, i);
-            if fewer.is_empty() {
-                Some(empty.clone())
-            } else {
-                evidence.fit(&fewer, &theta, empty.norm)
-            }
-        })
-        .collect();
-    let lost = |f: &Option<Fit>| fit.log_z - f.as_ref().map_or(0.0, |f| f.log_z);
-    let nats: Vec<f64> = without.iter().map(lost).collect();
+    let without = evidence.each_left_out(fit, empty);
+    let nats = <dyn Evidence>::lost(fit, &without);
     let mut out = Vec::new();
     for (i, (h, without)) in fit.set.iter().zip(&without).enumerate() {
         let hyp = &CATALOGUE[*h];

@@ -118,37 +118,28 @@ impl dyn Evidence + '_ {
     /// the joint fit).
     pub(crate) fn gate(&self, fit: Fit, empty: &Fit) -> Fit {
         let mut fit = fit;
-        let mut nats = self.lost(&fit, empty);
+        let mut fewer = self.each_left_out(&fit, empty);
         let mut i = 0;
         while i < fit.set.len() {
             let hyp = &CATALOGUE[fit.set[i]];
             let size = hyp.size(&fit.theta, self.zero()).abs();
             let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, i);
-            let (set, theta) = self.without(&fit, i);
-            let Some(fewer) = self.fit(&set, &theta, empty.norm) else { return empty.clone() };
-            let weather = hyp.nonlinear() && Self::from_one_drive(&fit, i, &fewer);
+            let nats = Self::lost(&fit, &fewer);
+            let Some(without) = &fewer[i] else { return empty.clone() };
+            let weather = hyp.nonlinear() && Self::from_one_drive(&fit, i, without);
             // The set without it is more probable (the median probability model: Barbieri and Berger,
             // Ann. Statist. 32, 2004).
             let unlikely =
                 nats.len() > 1 && self.worth(&fit, i, &nats) + log_odds(PRIOR_CAUSE) < 0.0;
             if small || weather || unlikely || self.folds(&fit, i) < STRONG_NATS {
-                fit = fewer;
-                nats = self.lost(&fit, empty);
+                fit = without.clone();
+                fewer = self.each_left_out(&fit, empty);
                 i = 0;
             } else {
                 i += 1;
             }
         }
         fit
-    }
-
-    /// What the set loses without each of its members, nats.
-    fn lost(&self, fit: &Fit, empty: &Fit) -> Vec<f64> {
-        let without = |i| {
-            let (set, theta) = self.without(fit, i);
-            self.fit(&set, &theta, empty.norm).map_or(0.0, |fewer| fewer.log_z)
-        };
-        (0..fit.set.len()).map(|i| fit.log_z - without(i)).collect()
     }
 
     /// The gain of the `i`-th member is of one drive, although others say as much about it: a day of

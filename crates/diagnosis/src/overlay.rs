@@ -98,7 +98,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("brake_delay", "delay_s") => Plus("brake.dead_time_s", 1.0),
         ("hidden_retarder", "torque_per_stage_nm") => Carry::Retarder,
         ("hidden_retarder", "force_n_per_m_s2") => Carry::BrakeDemand,
-        ("hidden_retarder", "torque_downhill_nm" | "steeper_offset_frac") => {
+        ("hidden_retarder", "torque_downhill_nm" | "descent_from_frac") => {
             Nowhere("the truck file has no retarder that acts on descents alone")
         }
         // A gain of the brakes, which stands for it, has no limit.

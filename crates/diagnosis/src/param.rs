@@ -219,13 +219,13 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::PayloadSpread, "gyration_squared_scale", "1", (0.25, -0.6, 0.8, 0.05), 0.0, 0.0),
     // Engine controllers take torque away over seconds to a minute.
     s(P::HeatCoolantLag, "derating_lag_s", "s", (20.0, 0.0, 120.0, 3.0), 0.0, 0.0),
-    // Half of its limit at 1 m/s² and below: retarders blend in before the service brakes.
+    // 1 / (1 + x) of what it has without a limit at a demand of 1 m/s²: retarders blend in before the
+    // service brakes.
     s(P::RetarderSaturation, "saturation_s2_m", "s2/m", (1.0, 0.0, 10.0, 0.2), 0.0, 0.0),
     // The wheels' self-alignment against the friction of the gear: not at all, or within seconds.
     s(P::PlayCentring, "centring_1_s", "1/s", (0.3, 0.0, 3.0, 0.05), 0.0, 0.0),
     s(P::RetarderSlope, "torque_downhill_nm", "Nm", (800.0, -300.0, 5000.0, 100.0), 0.0, 0.0),
-    // Beyond a descent of one per cent.
-    s(P::RetarderSteep, "steeper_offset_frac", "1", (0.006, -0.01, 0.02, 0.001), 0.0, 0.0),
+    s(P::RetarderSteep, "descent_from_frac", "1", (0.01, 0.0, 0.03, 0.001), 0.0, 0.0),
 ];
 
 impl Spec {

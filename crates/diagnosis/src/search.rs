@@ -196,6 +196,21 @@ impl dyn Evidence + '_ {
         debug_assert_eq!(theta.len(), PARAMS);
         (set, theta)
     }
+
+    /// The set without each of its members in turn, fitted; `None` where that cannot be computed.
+    pub(crate) fn each_left_out(&self, fit: &Fit, empty: &Fit) -> Vec<Option<Fit>> {
+        let without = |i| match self.without(fit, i) {
+            (fewer, _) if fewer.is_empty() => Some(empty.clone()),
+            (fewer, theta) => self.fit(&fewer, &theta, empty.norm),
+        };
+        (0..fit.set.len()).map(without).collect()
+    }
+
+    /// What the set loses without each of its members, nats.
+    pub(crate) fn lost(fit: &Fit, without: &[Option<Fit>]) -> Vec<f64> {
+        let of = |f: &Option<Fit>| fit.log_z - f.as_ref().map_or(0.0, |f| f.log_z);
+        without.iter().map(of).collect()
+    }
 }
 
 /// Sizes from which a hypothesis is fitted. What is linear needs one start, near nothing. Else the sign

@@ -120,17 +120,15 @@ fn against_functions(
     (fit, None, Sure::Yes)
 }
 
-/// Evidence once only the strongest of the causes that show where most is left stands there: a function
-/// that does not outdo it does not because something small stands beside it.
+/// Evidence once only the strongest of the causes that show where most is `left` stands there. A function
+/// that does not outdo this one is not made its better by a small cause that stands beside it.
 fn alone(problem: &Problem<'_>, empty: &Fit, fit: &Fit, left: Option<&Shape>) -> f64 {
     let Some(module) = left.map(|s| s.module) else { return fit.log_z };
     let mut now = fit.clone();
     while sharing(&now, module) > 1 {
-        let evidence = problem.evidence();
-        let fewer = (0..now.set.len()).filter(|i| shows(now.set[*i], module)).filter_map(|i| {
-            let (set, theta) = evidence.without(&now, i);
-            evidence.fit(&set, &theta, empty.norm)
-        });
+        let all = problem.evidence().each_left_out(&now, empty);
+        let there = all.into_iter().zip(&now.set).filter(|(_, h)| shows(**h, module));
+        let fewer = there.filter_map(|(without, _)| without);
         let Some(best) = fewer.max_by(|a, b| a.log_z.total_cmp(&b.log_z)) else { break };
         now = best;
     }

@@ -191,7 +191,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "hidden_retarder",
         &[P::RetarderSlope],
         &[P::RetarderSteep],
-        &[[-0.006, 0.0], [0.0, 0.0], [0.008, 0.0]],
+        &[[0.004, 0.0], [0.01, 0.0], [0.018, 0.0]],
         WITH_PEDAL,
         100.0,
         1.0,

@@ -13,15 +13,12 @@ use crate::{Drive, Plant};
 
 /// Power of a retarder that the truck file did not have, W: typical of a secondary retarder.
 pub(crate) const RETARDER_POWER_W: f64 = 400_000.0;
-/// Lag of such a retarder, s: at once, for nobody knows what it is.
+/// Lag of such a retarder behind its stage, s: none, a stage is reported as it acts.
 pub(crate) const RETARDER_LAG_S: f64 = 0.005;
-
-/// Time that a retarder without a name takes to fill with oil once it is asked for, s: some tenths of a
-/// second in hydrodynamic ones. It is what tells them from brakes, whose pressure is measured.
-const OIL_FILLS_S: f64 = 0.4;
-/// Descent from which such a retarder may hold the truck, and over how much of grade it does so more and
-/// more, 1.
-const DESCENT_FRAC: f64 = 0.01;
+/// Lag behind what asks for it otherwise, s: filling with oil takes hydrodynamic ones some tenths of a
+/// second (our estimate; not fitted). It tells them from brakes, whose pressure is measured.
+const FILLS_S: f64 = 0.4;
+/// Over how much grade a retarder of descents acts more and more, to either side of where it begins, 1.
 const DESCENT_WIDTH_FRAC: f64 = 0.002;
 
 /// Force of a retarder that follows its stage, N: the file's, with `extra_nm` more at the propeller
@@ -51,18 +48,14 @@ pub(super) fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<A
     })
 }
 
-/// How far a retarder is filled that holds the truck on descents while the accelerator is released, 0 to
-/// 1: those steeper than one per cent and `offset_frac`.
-pub(super) fn downhill(d: &Prepared, offset_frac: f64) -> Arc<[f64]> {
-    d.profiles.get(Kind::Downhill, [offset_frac], || {
-        let follow = 1.0 - (-Drive::STEP_S / OIL_FILLS_S).exp();
-        let mut filled = 0.0;
-        let steps = d.grade.iter().zip(&d.balance.coasts).map(|(grade, coasts)| {
-            let steeper = step(-grade - DESCENT_FRAC - offset_frac, DESCENT_WIDTH_FRAC);
-            filled += follow * (coasts * steeper - filled);
-            filled
-        });
-        pad(steps, d.balance.padded)
+/// How far a retarder is filled that holds the truck on descents steeper than `from_frac` while the
+/// accelerator is released, 0 to 1.
+pub(super) fn downhill(d: &Prepared, from_frac: f64) -> Arc<[f64]> {
+    d.profiles.get(Kind::Downhill, [from_frac], || {
+        let asked = d.grade.iter().zip(&d.balance.coasts);
+        let asked =
+            asked.map(|(grade, coasts)| coasts * step(-grade - from_frac, DESCENT_WIDTH_FRAC));
+        pad(filled(asked), d.balance.padded)
     })
 }
 
@@ -70,13 +63,17 @@ pub(super) fn downhill(d: &Prepared, offset_frac: f64) -> Arc<[f64]> {
 /// comes late as the oil fills.
 pub(super) fn blended_m_s2(d: &Prepared, saturation_s2_m: f64) -> Arc<[f64]> {
     d.profiles.get(Kind::Blended, [saturation_s2_m], || {
-        let follow = 1.0 - (-Drive::STEP_S / OIL_FILLS_S).exp();
-        let mut filled = 0.0;
-        let steps = d.balance.xbr.iter().take(d.n).map(|demand| {
-            filled +=
-                follow * (demand.max(0.0) / (1.0 + saturation_s2_m * demand.max(0.0)) - filled);
-            filled
-        });
-        pad(steps, d.balance.padded)
+        let demand = d.balance.xbr.iter().take(d.n).map(|x| x.max(0.0));
+        pad(filled(demand.map(|x| x / (1.0 + saturation_s2_m * x))), d.balance.padded)
+    })
+}
+
+/// What a retarder without a name has of what is asked of it, sample by sample.
+fn filled(asked: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+    let follow = 1.0 - (-Drive::STEP_S / FILLS_S).exp();
+    let mut now = 0.0;
+    asked.map(move |asked| {
+        now += follow * (asked - now);
+        now
     })
 }

@@ -4,7 +4,16 @@
 //! `log Z = 1/2 b' (A + P^-1)^-1 b - 1/2 log|I + P A|`, `A = G'MG`, `b = G'Mr`
 //! (MacKay, Neural Computation 4, 1992), relative to no extension.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// `I + S A S` with the prior's deviations `S`, factored, and its `log|.|`.
+fn scaled(a: &DMatrix<f64>, prior_sigma: &[f64]) -> Option<(Cholesky<f64, Dyn>, f64)> {
+    let (n, d) = (prior_sigma.len(), prior_sigma);
+    let of = |i, j| d[i] * a[(i, j)] * d[j] + if i == j { 1.0 } else { 0.0 };
+    let chol = DMatrix::from_fn(n, n, of).cholesky()?;
+    let log_det: f64 = 2.0 * (0..n).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
+    Some((chol, log_det))
+}
 
 /// Log evidence in nats and the posterior mean; `None` if the system is not positive definite.
 pub(crate) fn linear(
@@ -12,26 +21,18 @@ pub(crate) fn linear(
     b: &DVector<f64>,
     prior_sigma: &[f64],
 ) -> Option<(f64, DVector<f64>)> {
-    let n = b.len();
-    let d = DVector::from_iterator(n, prior_sigma.iter().copied());
-    let scaled =
-        DMatrix::from_fn(n, n, |i, j| d[i] * a[(i, j)] * d[j] + if i == j { 1.0 } else { 0.0 });
-    let rhs = DVector::from_fn(n, |i, _| d[i] * b[i]);
-    let chol = scaled.cholesky()?;
+    let d = DVector::from_column_slice(prior_sigma);
+    let (chol, log_det) = scaled(a, prior_sigma)?;
+    let rhs = d.component_mul(b);
     let x = chol.solve(&rhs);
-    let log_det: f64 = 2.0 * (0..n).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
     let log_z = 0.5 * rhs.dot(&x) - 0.5 * log_det;
     Some((log_z, x.component_mul(&d)))
 }
 
 /// Covariance `(A + P^-1)^-1` and `log|I + P A|`; `None` if the system is not positive definite.
 pub(crate) fn posterior(a: &DMatrix<f64>, prior_sigma: &[f64]) -> Option<(DMatrix<f64>, f64)> {
-    let (n, d) = (prior_sigma.len(), prior_sigma);
-    let scaled =
-        DMatrix::from_fn(n, n, |i, j| d[i] * a[(i, j)] * d[j] + if i == j { 1.0 } else { 0.0 });
-    let chol = scaled.cholesky()?;
-    let log_det: f64 = 2.0 * (0..n).map(|i| chol.l()[(i, i)].ln()).sum::<f64>();
-    let inverse = chol.inverse();
+    let (chol, log_det) = scaled(a, prior_sigma)?;
+    let (inverse, n, d) = (chol.inverse(), prior_sigma.len(), prior_sigma);
     Some((DMatrix::from_fn(n, n, |i, j| d[i] * inverse[(i, j)] * d[j]), log_det))
 }
 

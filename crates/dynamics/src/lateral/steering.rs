@@ -4,6 +4,9 @@
 //! gear, offset, ratio, first-order lag. The wheel goes to its demand at the full rate and waits there;
 //! the lag's response to that ramp is exact, so that the result does not depend on the step length.
 //!
+//! Within the play the road wheels' self-alignment may pull the gear to where they roll straight, against
+//! its friction: first order in time, our stand-in for the torque of pneumatic and caster trail.
+//!
 //! Left out: steering compliance under aligning moment, left-right (Ackermann) difference.
 
 use serde::{Deserialize, Serialize};

@@ -3,6 +3,8 @@
 use super::*;
 use crate::refit::Fit;
 
+mod gate;
+
 const ROWS: usize = 64;
 
 /// Rows that are orthogonal for different `k`, of length one.
