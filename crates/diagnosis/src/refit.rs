@@ -6,7 +6,7 @@ use crate::course::Course;
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, Theta};
-use crate::problem::{Direction, Gram};
+use crate::problem::{Direction, Gram, moves};
 use crate::stats::evidence;
 
 /// Part of the improvement that a step promises by which it may miss before the sensitivities are
@@ -239,7 +239,9 @@ impl dyn Evidence + '_ {
         for _ in 0..most {
             let Some(step) = self.best_step(&free, &at)? else { break };
             let kept = (step.improved - step.promised).abs() <= KEPT_PROMISE * step.promised;
-            let along = if kept { at.along } else { free.along(&step.to) };
+            // Tolerances that are taken where a fit is need to be taken where it ends.
+            let there = free.params.iter().any(|p| moves(*p));
+            let along = if kept && !there { at.along } else { free.along(&step.to) };
             at = self.stand(&free, &step.to, along)?;
             improved += step.improved;
             if step.improved < 0.3 + 1e-5 * improved {

@@ -10,8 +10,11 @@ use diagnosis::{
     diagnose, diagnose_with,
 };
 use dynamics::TruckParameters;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 use support::effects::{Effect, Shape};
 use support::outside::Outside;
+use support::random::normal;
 use support::{Campaign, generate};
 
 const SHORT: Campaign = Campaign { drives: 3, duration_s: 420.0, tolerance: 1.0 };
@@ -186,4 +189,49 @@ fn a_wind_that_acts_further_forward_is_not_a_stronger_wind() {
     assert!((wind - 5.5).abs() < 0.8, "{wind}");
     let share = p["tractor_share_offset_frac"];
     assert!((share.value - 0.17).abs() < 4.0 * share.sigma, "{share:?}");
+}
+
+/// Drives whose map has a grade that errs by 0.0004 over 110 m of road, as maps do.
+fn with_a_map_that_errs(mut set: DriveSet, seed: u64) -> DriveSet {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    for d in &mut set.drives {
+        let places = d.get(C::SMapM).unwrap().to_vec();
+        let mut grade = d.get(C::GradeFrac).unwrap().to_vec();
+        let (mut error, mut before) = (normal(&mut rng), places[0]);
+        for (g, s) in grade.iter_mut().zip(places) {
+            let kept = (-(s - before).max(0.0) / 110.0).exp();
+            error = kept * error + (1.0 - kept * kept).sqrt() * normal(&mut rng);
+            *g += 4e-4 * error;
+            before = s;
+        }
+        d.set(C::GradeFrac, grade);
+    }
+    set
+}
+
+/// The tolerance of the map's place was taken where nothing is moved. There it took part of the map's
+/// own error at every shift but none, and shifts came out a fifth too large, whatever their sign.
+#[test]
+fn a_map_that_errs_does_not_make_its_shift_larger() {
+    let campaign = Campaign { drives: 6, duration_s: 900.0, tolerance: 1.0 };
+    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
+    let of = |hidden: &[Effect], seed| {
+        with_a_map_that_errs(generate(hidden, &campaign, seed), seed + 7000)
+    };
+    let clean = Baseline::learn(&plant, &of(&[], 901), &Serial).unwrap();
+    let others = dynamics::catalogue::CATALOGUE.iter().map(|c| c.id).filter(|c| *c != "map_shift");
+    let excluded: Vec<String> = others.map(str::to_owned).collect();
+    let options = Options { excluded, ..Options::default() };
+    let mut beyond_m = 0.0;
+    let sizes = [26.0, -26.0, 32.0, -32.0];
+    for (seed, size) in (61..).zip(sizes) {
+        let set = of(&[cause("map_shift", size)], seed);
+        let d = diagnose_with(&plant, &set, Some(&clean), &options, &Serial, &mut |_| {}).unwrap();
+        assert_eq!(named(&d), ["map_shift"], "{size}: {:?}", d.verdict);
+        // The generator's map lies ahead where the truck file's lies behind.
+        let shift = d.causes[0].parameters["shift_m"];
+        assert!((-shift.value - size).abs() < 3.0 * shift.sigma, "{size}: {shift:?}");
+        beyond_m += (shift.value.abs() - size.abs()) / sizes.len() as f64;
+    }
+    assert!(beyond_m.abs() < 2.5, "too large by {beyond_m} m");
 }

@@ -88,9 +88,16 @@ impl Problem<'_> {
         let parts = self.each(|i| {
             let mut lines = vec![self.at(i, theta)];
             lines.extend(directions.iter().map(|d| self.line(i, from, d)));
-            self.marginal(i, &lines)
+            self.marginal(i, &lines, from)
         });
-        self.together(parts.into_iter())
+        let mut out = self.together(parts.into_iter());
+        let own: Option<Vec<_>> = (0..self.drives.len())
+            .map(|i| Some(self.moved(i, from)?.information.clone()))
+            .collect();
+        if let Some(own) = own.filter(|o| !o.is_empty()) {
+            out.own = Arc::new(own);
+        }
+        out
     }
 
     /// Gram matrix of the residual at `theta`, the directions from there, and further columns of one
@@ -106,7 +113,7 @@ impl Problem<'_> {
             let mut lines = vec![self.at(i, theta)];
             lines.extend(directions.iter().map(|d| self.line(i, theta, d)));
             lines.extend(columns(i).into_iter().map(|c| Self::column(module, c)));
-            self.marginal(i, &lines)
+            self.marginal(i, &lines, &self.reference.theta)
         });
         self.together(parts.into_iter())
     }
@@ -120,15 +127,18 @@ impl Problem<'_> {
         Gram { per_drive, common, own: self.common.clone(), log_det: 0.0 }
     }
 
-    /// Gram matrix of given lines in the metric `M` of a drive, and their products with the common
-    /// effects.
-    fn marginal(&self, i: usize, lines: &[Line]) -> (DMatrix<f64>, DMatrix<f64>) {
+    /// Gram matrix of given lines in the metric `M` of a drive, its tolerances taken at `from`, and
+    /// their products with the common effects.
+    fn marginal(&self, i: usize, lines: &[Line], from: &Theta) -> (DMatrix<f64>, DMatrix<f64>) {
         let mut g = self.inner_products(i, lines);
-        let against: Vec<DVector<f64>> = lines.iter().map(|l| self.against(i, l)).collect();
+        let moved = self.moved(i, from);
+        let moved = moved.as_deref();
+        let against: Vec<DVector<f64>> =
+            lines.iter().map(|l| self.against_at(i, l, moved)).collect();
         if self.nuisance[i].sigma.is_empty() {
             return (g, DMatrix::zeros(0, lines.len()));
         }
-        let factor = &self.nuisance[i].factor;
+        let factor = moved.map_or(&self.nuisance[i].factor, |m| &m.factor);
         let mut zc = DMatrix::from_columns(&against);
         if let Some(y) = factor.l_dirty().solve_lower_triangular(&zc) {
             g -= y.transpose() * y;

@@ -7,10 +7,12 @@
 mod calibrate;
 mod gram;
 mod hat;
+mod moved;
 mod nuisance;
 mod signals;
 
 pub(crate) use gram::Gram;
+pub(crate) use moved::moves;
 pub(crate) use nuisance::Rest;
 
 use calibrate::fit_whiteners;
@@ -62,6 +64,7 @@ pub(crate) struct Problem<'a> {
     /// Information of every drive about the means of the tolerances.
     common: Arc<Vec<DMatrix<f64>>>,
     kept: Vec<Kept>,
+    shifts: Vec<moved::Shifts>,
     hats: hat::Hats,
     executor: &'a dyn Executor,
 }
@@ -192,6 +195,7 @@ impl<'a> Problem<'a> {
         executor: &'a dyn Executor,
     ) -> Result<Self, DiagnosisError> {
         let kept = drives.iter().map(|_| Kept::default()).collect();
+        let shifts = drives.iter().map(|_| moved::Shifts::default()).collect();
         let mut problem = Self {
             plant,
             drives,
@@ -199,6 +203,7 @@ impl<'a> Problem<'a> {
             nuisance: Vec::new(),
             common: Arc::default(),
             kept,
+            shifts,
             hats: hat::Hats::default(),
             executor,
         };

@@ -72,6 +72,7 @@ impl Problem<'_> {
         if changed != Changed::Scatter {
             self.kept.iter().for_each(super::signals::Kept::renew);
         }
+        self.shifts.iter().for_each(super::moved::Shifts::renew);
         let directions = nuisance_directions(&self.reference.tolerance);
         let sigma: Vec<f64> =
             directions.iter().map(|d| self.reference.tolerance[d.p as usize]).collect();
@@ -106,14 +107,18 @@ impl Problem<'_> {
             .into_iter()
             .collect::<Option<Vec<_>>>()
             .ok_or_else(|| DiagnosisError::Numerics("tolerances of a drive".into()))?;
-        let spread = self.mean_spreads();
-        let information = |n: &Nuisance| {
-            let q = n.sigma.len();
-            let own = DMatrix::identity(q, q) - n.factor.inverse();
-            DMatrix::from_fn(q, q, |a, b| own[(a, b)] * (spread[a] * spread[b]))
-        };
+        let information = |n: &Nuisance| self.information(&n.factor);
         self.common = Arc::new(self.nuisance.iter().map(information).collect());
         Ok(())
+    }
+
+    /// Information of a drive about the means of the tolerances, from its factor of `I + Z'Z`.
+    pub(super) fn information(&self, factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
+        let spread = self.mean_spreads();
+        let inverse = factor.inverse();
+        let q = inverse.nrows();
+        let own = DMatrix::identity(q, q) - inverse;
+        DMatrix::from_fn(q, q, |a, b| own[(a, b)] * (spread[a] * spread[b]))
     }
 
     /// Standard deviations of the tolerances' means, in the order of their columns.

@@ -5,7 +5,7 @@
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
-use super::{Direction, Problem, inner};
+use super::{Direction, Problem, inner, moves};
 use crate::course::HATS;
 use crate::param::{SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
@@ -184,9 +184,15 @@ impl Problem<'_> {
         } else {
             t[direction.p as usize] += direction.step;
             let mut moved = self.replay_one(i, group, &t);
-            let base = self.point(i, group, theta);
-            for (x, b) in moved.iter_mut().flatten().zip(base.raw.iter().flatten()) {
-                *x = (b - *x) / direction.step;
+            let (base, step) = if moves(direction.p) {
+                // To both sides: an error that a secant shares with its foot pulls to one side.
+                t[direction.p as usize] -= 2.0 * direction.step;
+                (Arc::new(self.replay_one(i, group, &t)), 2.0 * direction.step)
+            } else {
+                (self.point(i, group, theta).raw.clone(), direction.step)
+            };
+            for (x, b) in moved.iter_mut().flatten().zip(base.iter().flatten()) {
+                *x = (b - *x) / step;
             }
             moved
         };
