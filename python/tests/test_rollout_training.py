@@ -16,6 +16,8 @@ torch = pytest.importorskip(
 )
 
 from tractrix.evaluate.drive import drive
+from tractrix.train.export import network_of
+from tractrix.train.margin import COLUMNS, ROWS
 from tractrix.train.rollout import Settings, Training
 
 
@@ -51,6 +53,24 @@ def test_one_seed_gives_one_network_on_any_threads_and_after_a_stop(
     assert weights(other) != weights(whole)
     with pytest.raises(ValueError, match="trained otherwise"):
         Training(small(seed=2), tmp_path / "parts", resume=True)
+
+
+def test_what_decides_keeps_its_lane_for_a_margin_in_company(tmp_path: Path) -> None:
+    training = Training(small(rounds=1, company_s=0.2), tmp_path)
+    training.run()
+    obs = training.obs[:200]
+    vehicles = obs[:, : ROWS * COLUMNS].reshape(-1, ROWS, COLUMNS)[:, 1:, 0].sum(axis=1)
+    assert vehicles.min() < vehicles.max() and set(np.unique(vehicles)) <= set(range(9))
+    with torch.no_grad():
+        bare = training.network(torch.from_numpy(obs)).numpy()
+        decides = training.policy(torch.from_numpy(obs)).numpy()
+    more = np.stack([0 * vehicles, 0.2 * np.maximum(vehicles - 1, 0), 0 * vehicles], 1)
+    np.testing.assert_allclose(decides, bare + more, atol=1e-5)
+    # It is what is exported, in the last validation or one before it.
+    exported = tractrix.Policy(tmp_path / "policy.safetensors")
+    assert exported.sidecar["training"]["settings"]["company_s"] == 0.2
+    wide = network_of(tmp_path / "policy.safetensors").layers[0].out_features
+    assert wide == training.network.layers[0].out_features + 1
 
 
 @pytest.mark.skipif(

@@ -31,6 +31,7 @@ from tractrix.evaluate.drive import TABLE2, drive
 from tractrix.train._command import command
 from tractrix.train.asking import Asking, Draws, Team
 from tractrix.train.export import encoded, export
+from tractrix.train.margin import with_margins
 from tractrix.train.network import QNetwork
 
 Array = npt.NDArray[Any]
@@ -68,6 +69,9 @@ class Settings:
     change_cost_s: float = 0.25
     """What a change costs in the reward, s, in the rollouts too: there every change that comes later
     pays it as well, so nothing is gained by putting one off."""
+    company_s: float = 0.15
+    """What a change has to gain for each vehicle beside the first that the newest frame shows, s
+    (`with_margins`): of who decides in the rollouts, on the road, in validations, and of the export."""
     epochs: int = 30
     """Passes over the states in a round."""
     batch: int = 256
@@ -139,17 +143,26 @@ class Training:
             self.round += 1
             self._save()
 
+    @property
+    def policy(self) -> QNetwork:
+        """The network with its margin, as it decides."""
+        return with_margins(self.network, company_s=self.settings.company_s)
+
     def act(self, obs: Array, mask: Array) -> Array:
         """The best of what the gate passes."""
+        return self._best(self.policy, obs, mask)
+
+    @staticmethod
+    def _best(policy: QNetwork, obs: Array, mask: Array) -> Array:
         with torch.no_grad():
-            values = self.network(torch.from_numpy(obs)).numpy()
+            values = policy(torch.from_numpy(obs)).numpy()
         best: Array = np.where(mask, values, -np.inf).argmax(axis=1)
         return best
 
     def _ask(self, rng: np.random.Generator) -> None:
         """Drives, and adds states with what changes are worth there."""
         draws = Draws.of(rng, self.settings.decisions, self.settings.envs)
-        former = encoded(self.network, spec="ours") if self.round > 0 else None
+        former = encoded(self.policy, spec="ours") if self.round > 0 else None
         obs, worth, scenario = self.team.ask(draws, former)
         self.obs = np.concatenate([self.obs, obs])
         self.worth = np.concatenate([self.worth, worth])
@@ -187,10 +200,10 @@ class Training:
 
     def _validate(self) -> dict[str, float]:
         """Drives without exploration; the best so far is exported."""
-        settings = self.settings
+        settings, policy = self.settings, self.policy
         seeds = range(VALIDATION_SEED, VALIDATION_SEED + settings.validation_seeds)
         figures = drive(
-            lambda _, obs, mask: self.act(obs, mask.astype(np.bool_)),
+            lambda _, obs, mask: self._best(policy, obs, mask.astype(np.bool_)),
             settings.scenarios,
             seeds,
             episode_s=settings.episode_s,
@@ -204,7 +217,7 @@ class Training:
         if found["valid_reward_s"] > self.best:
             self.best = found["valid_reward_s"]
             export(
-                self.network,
+                policy,
                 self.out / "policy.safetensors",
                 spec="ours",
                 seeds=[settings.seed],
