@@ -69,7 +69,7 @@ class Settings:
     change_cost_s: float = 0.25
     """What a change costs in the reward, s, in the rollouts too: there every change that comes later
     pays it as well, so nothing is gained by putting one off."""
-    company_s: float = 0.15
+    company_s: float = 0.28
     """What a change has to gain for each vehicle beside the first that the newest frame shows, s
     (`with_margins`): of who decides in the rollouts, on the road, in validations, and of the export."""
     epochs: int = 30
