@@ -9,6 +9,9 @@
 //! u_d ~ N(0, tau²)   of each drive for itself
 //! w_k ~ N(0, rho²)   of all drives together, B_k hat functions of a signal that drives the cause
 //! ```
+//! A wind has `w_k` of each drive for itself, over its time: weather swells and turns, and what blows
+//! aside of it goes with its whole length.
+//!
 //! (Kennedy and O'Hagan, J. R. Statist. Soc. B 63, 2001; here multiplicative.) What another cause
 //! would patch of the form of a large one is explained without it, and a size is known no better
 //! than its form.
@@ -16,7 +19,7 @@
 use dynamics::catalogue::Law;
 use nalgebra::{DMatrix, DVector};
 
-use crate::decisions::{RHO, RHO_SHAPE, TAU};
+use crate::decisions::{RHO, RHO_SHAPE, TAU, WEATHER};
 use crate::hypothesis::{Along, CATALOGUE, Hypothesis};
 use crate::param::{P, Theta};
 use crate::problem::{Direction, Gram, Hat};
@@ -39,17 +42,43 @@ pub(crate) fn form(h: &Hypothesis) -> f64 {
 }
 
 fn rho(h: &Hypothesis, along: &Along) -> f64 {
-    if matches!(along, Along::Open(_)) { form(h) } else { RHO }
+    match along {
+        Along::Open(_) => form(h),
+        Along::Fitted(_) => RHO,
+        Along::Weather(_) => WEATHER,
+    }
+}
+
+/// Is a size one of weather?
+fn weather(h: &Hypothesis) -> bool {
+    h.course.iter().any(|along| matches!(along, Along::Weather(_)))
 }
 
 /// Random effects of one size: columns of a Gram matrix (the residual is column 0).
 #[derive(Debug, Clone)]
 struct Effect {
     p: P,
+    /// The cause that it is a size of.
+    of: &'static Hypothesis,
     /// Its sensitivity.
     column: usize,
     /// Its hats per signal, with the deviation of its course there.
     hats: Vec<(f64, Vec<usize>)>,
+}
+
+impl Effect {
+    /// Size that its effects go with: that of a wind goes to all sides.
+    fn size(&self, theta: &Theta, zero: &Theta) -> f64 {
+        let own = [self.p];
+        let of = if weather(self.of) { self.of.sizes } else { &own };
+        let squared = |p: &P| (theta[*p as usize] - zero[*p as usize]).powi(2);
+        of.iter().map(squared).sum::<f64>().sqrt()
+    }
+
+    /// Its scatter between drives, in its size.
+    fn between(&self) -> f64 {
+        if weather(self.of) { WEATHER } else { TAU }
+    }
 }
 
 /// Random effects of the sizes among some directions.
@@ -65,6 +94,7 @@ impl Course {
             if !sizes.contains(&p) {
                 continue;
             }
+            let Some(of) = CATALOGUE.iter().find(|h| h.sizes.contains(&p)) else { continue };
             let mut hats = Vec::new();
             for (name, rho) in signals(p) {
                 let Some(signal) = signal(name) else { continue };
@@ -75,7 +105,7 @@ impl Course {
                 }
                 hats.push((rho, (first..first + HATS).collect()));
             }
-            out.push(Effect { p, column: j + 1, hats });
+            out.push(Effect { p, of, column: j + 1, hats });
         }
         Self(out)
     }
@@ -95,8 +125,8 @@ impl Course {
     pub(crate) fn deviations(&self, count: usize, theta: &Theta, zero: &Theta) -> Vec<f64> {
         let mut out = vec![0.0; count];
         for e in &self.0 {
-            let size = (theta[e.p as usize] - zero[e.p as usize]).abs();
-            out[e.column - 1] = TAU * size;
+            let size = e.size(theta, zero);
+            out[e.column - 1] = e.between() * size;
             for (rho, hats) in &e.hats {
                 hats.iter().for_each(|j| out[j - 1] = rho * size);
             }
@@ -125,12 +155,13 @@ impl Course {
         let shows = |j: usize| gram.per_drive.iter().map(|g| g[(j, j)]).sum::<f64>();
         let (mut between, mut along) = (Vec::new(), Vec::new());
         for e in &self.0 {
-            let size = (theta[e.p as usize] - zero[e.p as usize]).abs();
-            between.push((e.column, TAU * size));
+            let size = e.size(theta, zero);
+            between.push((e.column, e.between() * size));
             for (rho, hats) in &e.hats {
                 let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
                 let part = (shows(e.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-                along.extend(hats.iter().map(|j| (*j, rho * size * part)));
+                let to = if weather(e.of) { &mut between } else { &mut along };
+                to.extend(hats.iter().map(|j| (*j, rho * size * part)));
             }
         }
         gram.marginal(keep, &between, &along)
@@ -241,6 +272,7 @@ mod tests {
             let law = h.of_truck().unwrap().law;
             let along: Vec<f64> = h.sizes.iter().flat_map(|p| signals(*p)).map(|s| s.1).collect();
             match law {
+                Law::Physics if weather(h) => assert_eq!(along[0], WEATHER, "{}", h.id),
                 Law::Physics => assert!(along.iter().all(|rho| *rho == RHO), "{}", h.id),
                 Law::Chosen => assert!(along.contains(&RHO_SHAPE), "{}", h.id),
             }
@@ -249,7 +281,7 @@ mod tests {
                 assert!(signal(along.signal()).is_some(), "{}: {}", h.id, along.signal());
                 fitted += usize::from(matches!(along, Along::Fitted(_)));
                 // what is fitted needs a form
-                assert!(matches!(along, Along::Open(_)) || !h.shapes.is_empty(), "{}", h.id);
+                assert!(!matches!(along, Along::Fitted(_)) || !h.shapes.is_empty(), "{}", h.id);
             }
         }
         assert!(broad >= 15 && fitted >= 5, "{broad} {fitted}");

@@ -16,6 +16,10 @@ pub(crate) const RHO: f64 = 0.05;
 /// one of many: a quarter more or less is still that cause (the meaning of the word, not fitted). Not
 /// along a signal over which its form is fitted: form and course would be free of each other.
 pub(crate) const RHO_SHAPE: f64 = 0.25;
+/// Deviation of a wind within a drive, in its mean: turbulence of 0.15 to 0.25 along it (IEC 61400-1,
+/// categories A to C), directions that scatter by 0.17 to 0.26 rad in an hour (Pasquill's classes D to
+/// C, EPA-454/R-99-005).
+pub(crate) const WEATHER: f64 = 0.2;
 /// Probability of a cause before any drive is seen: with 37 causes one truck in six has one.
 pub(crate) const PRIOR_CAUSE: f64 = 0.005;
 /// Probability of a free function: of some two hundred that are tried one, in one truck in a hundred.

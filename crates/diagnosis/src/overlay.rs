@@ -62,6 +62,9 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("wind" | "crosswind", "tractor_share_offset_frac") => {
             Plus("resistance.side_force_tractor_frac", 1.0)
         }
+        ("wind" | "crosswind", "trailer_behind_cg_m") => {
+            Plus("resistance.side_force_trailer_behind_cg_m", 1.0)
+        }
         ("mass", "mass_scale") => Times("instruments.mass_scale_coeff"),
         ("grade_bias", "grade_frac") => Plus("instruments.grade_bias_frac", 1.0),
         ("map_shift", "shift_m") => Plus("instruments.map_shift_m", 1.0),

@@ -88,10 +88,12 @@ pub(crate) enum P {
     PlayCentring,
     RetarderSlope,
     RetarderSteep,
+    WindBehind,
+    CrosswindBehind,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 79;
+pub(crate) const PARAMS: usize = 81;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -206,7 +208,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::TurboStart, "threshold_offset_frac", "1", (0.1, -0.3, 0.4, 0.02), 0.0, 0.0),
     s(P::SteerDelay, "pure_delay_frac", "1", (0.5, 0.0, 1.0, 0.1), 0.0, 0.0),
     s(P::BrakeLoad, "load_estimate_scale", "1", (0.15, -0.6, 1.5, 0.02), 0.15, 0.0),
-    // Where the side force acts: its moments go with the share that is not on the tractor.
+    // Where the side force acts: share and point are its two moments.
     s(P::WindShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
     s(P::CrosswindShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
     // At the engine's highest rate; laboratories are right within a per cent or two.
@@ -226,6 +228,9 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::PlayCentring, "centring_1_s", "1/s", (0.3, 0.0, 3.0, 0.05), 0.0, 0.0),
     s(P::RetarderSlope, "torque_downhill_nm", "Nm", (800.0, -300.0, 5000.0, 100.0), 0.0, 0.0),
     s(P::RetarderSteep, "descent_from_frac", "1", (0.01, 0.0, 0.03, 0.001), 0.0, 0.0),
+    // Edges that suck, gap and rounding move it by a metre or so along the box.
+    s(P::WindBehind, "trailer_behind_cg_m", "m", (1.0, -4.0, 4.0, 0.2), 0.0, 0.0),
+    s(P::CrosswindBehind, "trailer_behind_cg_m", "m", (1.0, -4.0, 4.0, 0.2), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -263,6 +268,8 @@ impl Spec {
                 | P::SteerDelay
                 | P::WindShare
                 | P::CrosswindShare
+                | P::WindBehind
+                | P::CrosswindBehind
                 | P::FuelFlowPower
                 | P::Co2Power
         )

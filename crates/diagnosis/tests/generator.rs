@@ -39,7 +39,7 @@ fn the_generator_s_truck_turns_as_the_reference_truck_does() {
         let bodies = Bodies::new(total_kg, total_kg - 19_000.0, &Figures::SHEET);
         let mut s = [0.0; 4];
         for _ in 0..3000 {
-            s = bodies.step(&s, 80.0 / 3.6, 0.01, [0.0; 2], 0.01);
+            s = bodies.step(&s, 80.0 / 3.6, 0.01, [0.0; 3], 0.01);
         }
         assert!((s[1] / 0.01 - gain).abs() < 0.01, "{}", s[1] / 0.01);
         assert!((s[1] - s[2]).abs() < 1e-6);

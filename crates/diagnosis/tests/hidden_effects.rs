@@ -191,6 +191,23 @@ fn a_wind_that_acts_further_forward_is_not_a_stronger_wind() {
     assert!((share.value - 0.17).abs() < 4.0 * share.sigma, "{share:?}");
 }
 
+/// A day's wind and one that turns within a drive left so much that another drag stood beside a strong
+/// wind.
+#[test]
+fn a_wind_that_turns_within_a_drive_needs_no_other_cause() {
+    for (turn, behind, seed) in [(0.3, 0.9, 58), (0.8, 0.1, 59)] {
+        let shape = Shape([turn, 0.7, behind, 1.0]);
+        let d = judge(&drives(&[Effect::Cause { id: "wind", size: 7.0, shape }], seed)).unwrap();
+        assert_eq!(named(&d), ["wind"], "{:?}", d.verdict);
+        let p = &d.causes[0].parameters;
+        let (sin, cos) = (turn * core::f64::consts::TAU).sin_cos();
+        for (key, hidden) in [("wind_to_x_m_s", 7.0 * cos), ("wind_to_y_m_s", 7.0 * sin)] {
+            let found = p[key];
+            assert!((found.value - hidden).abs() < 2.6 * found.sigma, "{hidden} {found:?}");
+        }
+    }
+}
+
 /// Drives whose map has a grade that errs by 0.0004 over 110 m of road, as maps do.
 fn with_a_map_that_errs(mut set: DriveSet, seed: u64) -> DriveSet {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

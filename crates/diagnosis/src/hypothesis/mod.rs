@@ -16,6 +16,7 @@ pub(crate) type Start = [f64; 2];
 const BOUND: f64 = 1e-3;
 
 /// One hypothesis. Several may share an id: variants of shape.
+#[derive(Debug)]
 pub(crate) struct Hypothesis {
     pub(crate) id: &'static str,
     /// Sizes, then shapes.
@@ -34,19 +35,22 @@ pub(crate) struct Hypothesis {
 }
 
 /// A measured signal along which the course of a cause may differ from the catalogue's.
+#[derive(Debug)]
 pub(crate) enum Along {
     /// As widely as its law is open.
     Open(&'static str),
     /// Its form is fitted over it (onset and slope, threshold and hysteresis, knee): with a wide course
     /// beside it the two would be free of each other.
     Fitted(&'static str),
+    /// It is weather: of every drive for itself, it swells and turns.
+    Weather(&'static str),
 }
 
 impl Along {
     /// The column.
     pub(crate) fn signal(&self) -> &'static str {
         match self {
-            Self::Open(name) | Self::Fitted(name) => name,
+            Self::Open(name) | Self::Fitted(name) | Self::Weather(name) => name,
         }
     }
 }

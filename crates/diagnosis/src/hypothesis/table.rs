@@ -1,7 +1,7 @@
 //! The table of hypotheses: which parameters, from which starts, with which channels and how small is
 //! not worth a word.
 
-use super::Along::{self, Fitted, Open};
+use super::Along::{self, Fitted, Open, Weather};
 use super::{Hypothesis, Start};
 use crate::Channel as C;
 use crate::param::P;
@@ -52,9 +52,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h("rolling_resistance", &[P::Rolling], &[], ONE, LONG, 0.06, 0.0)
         .along(&[Open("speed_m_s"), Open("time_s")]),
     h("air_drag", &[P::Drag], &[], ONE, LONG, 0.05, 0.0).along(&[Open("time_s")]),
-    h("headwind", &[P::Headwind], &[], ONE, LONG, 0.8, 0.0).along(&[Open("time_s")]),
-    h("wind", &[P::WindX, P::WindY], &[P::WindShare], ONE, WITH_HEADING, 2.0, 0.0)
-        .along(&[Open("time_s")]),
+    h("headwind", &[P::Headwind], &[], ONE, LONG, 0.8, 0.0).along(&[Weather("time_s")]),
+    h("wind", &[P::WindX, P::WindY], &[P::WindShare, P::WindBehind], ONE, WITH_HEADING, 2.0, 0.0)
+        .along(&[Weather("time_s")]),
     h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0)
         .along(&[Open("grade_frac"), Open("accel_y_m_s2")]),
     h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0)
@@ -209,7 +209,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.0,
     )
     .along(&[Open("time_s")]),
-    h("steering_ratio", &[P::SteerRatio], &[], ONE, STEERING, 0.02, 0.0).along(&[Open("time_s")]),
+    // Gear and linkage turn the wheels less about the middle than beyond, or more.
+    h("steering_ratio", &[P::SteerRatio], &[], ONE, STEERING, 0.02, 0.0)
+        .along(&[Open("steering_wheel_rad")]),
     h("steering_offset", &[P::SteerOffset], &[], ONE, STEERING, 0.015, 0.0)
         .along(&[Open("time_s")]),
     h(
@@ -268,8 +270,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     .along(&[Open("curvature_1_m")]),
     h("engine_brake_torque", &[P::EngineBrakeScale], &[], ONE, WITH_STAGE, 0.06, 0.0)
         .along(&[Open("engine_speed_rpm")]),
-    h("crosswind", &[P::Crosswind], &[P::CrosswindShare], ONE, STEERING, 1.0, 0.0)
-        .along(&[Open("time_s")]),
+    h("crosswind", &[P::Crosswind], &[P::CrosswindShare, P::CrosswindBehind], ONE, STEERING, 1.0, 0.0)
+        .along(&[Weather("time_s")]),
     h("fuel_flow_scale", &[P::FuelFlow], &[P::FuelFlowPower], RATES, METERS, 0.02, 0.0)
         .along(&[Open("engine_speed_rpm"), Open("time_s")]),
     h("co2_scale", &[P::Co2Scale], &[P::Co2Power], RATES, METERS, 0.03, 0.0)

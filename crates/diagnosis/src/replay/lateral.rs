@@ -54,6 +54,7 @@ struct BySpeed {
     steer: State,
     tractor: State,
     trailer: State,
+    trailer_moment: State,
 }
 
 impl BySpeed {
@@ -67,6 +68,7 @@ impl BySpeed {
             steer: x.b_steer,
             tractor: x.b_tractor_force,
             trailer: x.b_trailer_force,
+            trailer_moment: x.b_trailer_moment,
         };
         for i in 0..4 {
             for j in 0..4 {
@@ -120,7 +122,11 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
     let share = plant.truck.resistance.side_force_tractor_frac
         + t[P::WindShare as usize]
         + t[P::CrosswindShare as usize];
-    let wind = plus(&system.tractor.map(|b| share * b), &system.trailer, 1.0 - share);
+    let behind_m = plant.truck.resistance.side_force_trailer_behind_cg_m
+        + t[P::WindBehind as usize]
+        + t[P::CrosswindBehind as usize];
+    let trailer = plus(&system.trailer, &system.trailer_moment, -behind_m);
+    let wind = plus(&system.tractor.map(|b| share * b), &trailer, 1.0 - share);
     let side_force = SideForce::new(d, plant, t);
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     let bias = [P::YawBias, P::TrailerYawBias, P::AccelYBias].map(|p| t[p as usize]);

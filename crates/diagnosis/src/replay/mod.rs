@@ -231,6 +231,8 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::StiffnessFollowsMass
         | P::WindShare
         | P::CrosswindShare
+        | P::WindBehind
+        | P::CrosswindBehind
         | P::Bank
         | P::AccelYBias
         | P::TrailerYawBias => &[G::Lateral],

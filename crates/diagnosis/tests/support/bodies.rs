@@ -76,8 +76,9 @@ impl Bodies {
         Self { trailer_kg: m, trailer_izz: izz, trailer_cg: cg, stiffness: c, inverse: inverse(a) }
     }
 
-    /// Rate of the state at speed `v`, road-wheel angle `delta` and side forces on the two CGs, N.
-    pub(crate) fn rate(&self, s: &State, v: f64, delta: f64, side: [f64; 2]) -> State {
+    /// Rate of the state at speed `v`, road-wheel angle `delta` and side forces on the two CGs, N; the last one is
+    /// what turns the trailer about its CG to the right, Nm.
+    pub(crate) fn rate(&self, s: &State, v: f64, delta: f64, side: [f64; 3]) -> State {
         let [slip, w, wt, angle] = *s;
         let c = &self.stiffness;
         let mut force = c[0] * (delta - (slip + STEER_AHEAD * w) / v);
@@ -94,7 +95,7 @@ impl Bodies {
             turn += l * f;
         }
         behind += side[1];
-        turn += self.trailer_cg * side[1];
+        turn += self.trailer_cg * side[1] + side[2];
         let m = self.trailer_kg;
         let right = [
             force + side[0] + behind - (TRACTOR_KG + m) * v * w,
@@ -106,7 +107,7 @@ impl Bodies {
     }
 
     /// One midpoint step.
-    pub(crate) fn step(&self, s: &State, v: f64, delta: f64, side: [f64; 2], dt: f64) -> State {
+    pub(crate) fn step(&self, s: &State, v: f64, delta: f64, side: [f64; 3], dt: f64) -> State {
         let k: State = self.rate(s, v, delta, side);
         let mid: State = core::array::from_fn(|i| s[i] + 0.5 * dt * k[i]);
         let k = self.rate(&mid, v, delta, side);

@@ -87,7 +87,7 @@ pub(crate) fn drive(
     let mut exhaust = Exhaust::new(1.2, 1.0, tolerance, rng);
     let (mut v, mut place, mut altitude) = (0.5_f64, 0.0_f64, setting.altitude_m);
     let mut heading = between(rng, -3.0, 3.0);
-    let mut course = heading;
+    let (begun, mut course) = (heading, heading);
     let mut lateral: State = [0.0; 4];
     let (mut gear_rad, mut delta, mut offset) = (0.0_f64, 0.0_f64, 0.0_f64);
     let (mut pressure, mut brake_k, mut coolant) = (0.0_f64, 0.0_f64, 80.0_f64);
@@ -156,7 +156,7 @@ pub(crate) fn drive(
         let service_n = 400.0 * pressure * f.brake_scale * a.friction;
         brake_k += STEP_S * (service_n * v / 200e3 - brake_k / 600.0);
         // Air.
-        let (sin, cos) = heading.sin_cos();
+        let (sin, cos) = (heading - f.wind_turns_rad * (time_s / 70.0 + begun).sin()).sin_cos();
         let along = v + f.headwind - f.wind[0] * cos - f.wind[1] * sin;
         let across = f.crosswind + f.wind[1] * cos - f.wind[0] * sin;
         let yaw_deg = (across / along.abs().max(1.0)).atan().to_degrees();
@@ -179,6 +179,7 @@ pub(crate) fn drive(
         let force = [
             f.side_share * blown + a.side_n[0] - tractor_kg * G * f.bank_rad,
             (1.0 - f.side_share) * blown + a.side_n[1] - trailer_kg * G * f.bank_rad,
+            (1.0 - f.side_share) * blown * f.side_behind_m,
         ];
         if i % 5 == 0 {
             let fuel =

@@ -114,6 +114,8 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
                 let (sin, cos) = shape.at(0, 0.0, core::f64::consts::TAU).sin_cos();
                 f.wind = [f.wind[0] + x * cos, f.wind[1] + x * sin];
                 f.side_share = shape.at(1, 0.15, 0.45);
+                f.side_behind_m = shape.at(2, -1.0, 1.0);
+                f.wind_turns_rad = shape.at(3, 0.0, 0.3);
             }
             "mass" => {
                 f.mass_scale *= 1.0 + x;
@@ -156,6 +158,7 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
             "crosswind" => {
                 f.crosswind += x;
                 f.side_share = shape.at(1, 0.15, 0.45);
+                f.side_behind_m = shape.at(2, -1.0, 1.0);
             }
             _ => {}
         }

@@ -91,6 +91,10 @@ pub(crate) struct Figures {
     pub(crate) wind: [f64; 2],
     /// Part of the side force that acts on the tractor.
     pub(crate) side_share: f64,
+    /// How far behind the trailer's CG the rest of it acts, m.
+    pub(crate) side_behind_m: f64,
+    /// How far the wind turns to and fro, rad.
+    pub(crate) wind_turns_rad: f64,
     pub(crate) grade_bias: f64,
     pub(crate) map_shift_m: f64,
     pub(crate) speed_scale: f64,
@@ -130,6 +134,8 @@ impl Figures {
         crosswind: 0.0,
         wind: [0.0; 2],
         side_share: 0.25,
+        side_behind_m: 0.0,
+        wind_turns_rad: 0.0,
         grade_bias: 0.0,
         map_shift_m: 0.0,
         speed_scale: 1.0,

@@ -3,7 +3,8 @@
 //! ```text
 //! F_roll  = m g cos(grade) (f0 + f1 v) k(T)            k: tyre warm-up, 1 when warm
 //! F_air   = 1/2 rho CdA (1 + k_y |beta|) V^2 cos(beta)  V, beta: air flow relative to the truck
-//! F_side  = 1/2 rho A_side c_side beta V^2              crosswind, a share of it on the tractor
+//! F_side  = 1/2 rho A_side c_side beta V^2              crosswind, a share of it on the tractor, the
+//!                                                        rest on the trailer at a point of its own
 //! F_grade = m g sin(grade)
 //! F_curve = k_c (m a_y)^2 / C                            induced drag of the side forces, C: sum
 //! ```
@@ -15,6 +16,7 @@ pub use tractrix_core::road_load::{area_at_yaw_m2, drag_n, on_course};
 use tractrix_core::{GAS_CONSTANT_AIR_J_KG_K, GRAVITY_M_S2};
 
 use crate::bounds::Bounds;
+use crate::lateral::BodyForce;
 
 /// The resistance block of a truck file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,6 +49,11 @@ pub struct ResistanceParameters {
     pub side_force_area_m2_rad: f64,
     /// Share of the side force that acts on the tractor.
     pub side_force_tractor_frac: f64,
+    /// How far behind the trailer's centre of gravity its part of the side force acts, m (a box whose
+    /// front edges suck has it further forward than its middle; a payload moves the centre of gravity,
+    /// not the box).
+    #[serde(default)]
+    pub side_force_trailer_behind_cg_m: f64,
     /// Head wind that blows against the truck wherever it goes, m/s (a fault of the map of wind).
     #[serde(default)]
     pub headwind_m_s: f64,
@@ -172,6 +179,8 @@ impl ResistanceParameters {
         b.within("drag_yaw_1_rad", self.drag_yaw_1_rad, 0.0, 10.0);
         b.within("side_force_area_m2_rad", self.side_force_area_m2_rad, 0.0, 500.0);
         b.within("side_force_tractor_frac", self.side_force_tractor_frac, 0.0, 1.0);
+        let behind_m = self.side_force_trailer_behind_cg_m;
+        b.within("side_force_trailer_behind_cg_m", behind_m, -8.0, 8.0);
         b.within("headwind_m_s", self.headwind_m_s, -30.0, 30.0);
         b.within("crosswind_to_left_m_s", self.crosswind_to_left_m_s, -30.0, 30.0);
         b.within("wind_to_x_m_s", self.wind_to_x_m_s, -30.0, 30.0);
@@ -216,18 +225,39 @@ impl ResistanceParameters {
         air_drag_n(air.density_kg_m3, self.drag_area_m2, self.drag_yaw_1_rad, flow)
     }
 
-    /// Side forces of the wind on (tractor, trailer), N, positive to the left.
+    /// Side forces of the wind on (tractor, trailer), and their moments about the bodies' centres of
+    /// gravity.
     #[must_use]
-    pub fn side_n(&self, air: &AirFlow) -> (f64, f64) {
+    pub fn side(&self, air: &AirFlow) -> (BodyForce, BodyForce) {
         let total =
             side_n(air.density_kg_m3, self.side_force_area_m2_rad, air.yaw_rad(), air.squared());
-        (total * self.side_force_tractor_frac, total * (1.0 - self.side_force_tractor_frac))
+        let (tractor, trailer) =
+            (total * self.side_force_tractor_frac, total * (1.0 - self.side_force_tractor_frac));
+        let yaw_moment_nm = -self.side_force_trailer_behind_cg_m * trailer;
+        (
+            BodyForce { side_n: tractor, yaw_moment_nm: 0.0 },
+            BodyForce { side_n: trailer, yaw_moment_nm },
+        )
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A force to the left that acts behind the centre of gravity turns the trailer to the right.
+    #[test]
+    fn the_trailers_side_force_acts_where_the_file_says() {
+        let mut r = crate::TruckParameters::load("reference").unwrap().resistance;
+        let air = AirFlow { head_m_s: 20.0, cross_m_s: 4.0, density_kg_m3: 1.2 };
+        let at_cg = r.side(&air);
+        r.side_force_trailer_behind_cg_m = 1.5;
+        let (tractor, trailer) = r.side(&air);
+        assert_eq!((at_cg.0, at_cg.1.yaw_moment_nm), (tractor, 0.0));
+        assert_eq!(trailer.side_n, at_cg.1.side_n);
+        assert_eq!(trailer.yaw_moment_nm, -1.5 * trailer.side_n);
+        assert!(trailer.side_n > 0.0);
+    }
 
     /// Table of ISO 2533: 275.15 K and 79,495 Pa at 2 km, 255.65 K and 54,020 Pa at 5 km.
     #[test]

@@ -72,6 +72,8 @@ pub struct StateSpace {
     pub b_tractor_force: [f64; 4],
     /// Input column of a side force at the trailer's CG, per N.
     pub b_trailer_force: [f64; 4],
+    /// Input column of a yaw moment on the trailer, per Nm.
+    pub b_trailer_moment: [f64; 4],
 }
 
 /// External loads and longitudinal quantities that the side forces depend on.
@@ -173,6 +175,7 @@ impl YawSideslip {
             b_steer: input([c1, x1 * c1, 0.0]),
             b_tractor_force: input([1.0, 0.0, 0.0]),
             b_trailer_force: input([1.0, -self.hitch_behind_cg_m, -self.trailer_cg_behind_hitch_m]),
+            b_trailer_moment: input([0.0, 0.0, 1.0]),
         }
     }
 

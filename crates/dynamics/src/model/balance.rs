@@ -126,15 +126,16 @@ impl TruckModel {
         if s.clutch_locked && wheel.gear > 0 {
             s.engine_speed_rad_s = d.engine_speed_rad_s(next, wheel.gear);
         }
-        let (tractor_n, trailer_n) = if air.cross_m_s == 0.0 { (0.0, 0.0) } else { r.side_n(&air) };
+        let still = (BodyForce::default(), BodyForce::default());
+        let (tractor, trailer) = if air.cross_m_s == 0.0 { still } else { r.side(&air) };
         LateralInputs {
             speed_m_s: 0.5 * (v + next),
             accel_x_m_s2: s.accel_m_s2,
             steering_wheel_rad: command.steering_wheel_rad,
             grade_rad: patch.grade_rad,
             bank_rad: patch.bank_rad,
-            tractor: BodyForce { side_n: tractor_n, yaw_moment_nm: 0.0 },
-            trailer: BodyForce { side_n: trailer_n, yaw_moment_nm: 0.0 },
+            tractor,
+            trailer,
             axle_longitudinal_force_n: axle_n,
         }
     }
