@@ -28,6 +28,9 @@ use crate::signal::signal;
 
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
+/// Those of weather over the time of a drive: it changes within minutes (gusts of tens of seconds are
+/// noise, which drives in order have too).
+const OF_WEATHER: usize = 10;
 
 /// Signals along which the course of a cause with this size may differ, those that drive it, and its
 /// standard deviation there.
@@ -96,14 +99,15 @@ impl Course {
             }
             let Some(of) = CATALOGUE.iter().find(|h| h.sizes.contains(&p)) else { continue };
             let mut hats = Vec::new();
+            let count = if weather(of) { OF_WEATHER } else { HATS };
             for (name, rho) in signals(p) {
                 let Some(signal) = signal(name) else { continue };
                 let first = directions.len() + 1;
-                for knot in 0..HATS {
-                    let hat = Some(Hat { signal, knot });
+                for knot in 0..count {
+                    let hat = Some(Hat { signal, knot, last: count - 1 });
                     directions.push(Direction { hat, ..directions[j].clone() });
                 }
-                hats.push((rho, (first..first + HATS).collect()));
+                hats.push((rho, (first..first + count).collect()));
             }
             out.push(Effect { p, of, column: j + 1, hats });
         }
@@ -262,6 +266,24 @@ impl Gram {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Weather scatters by its whole length to every side, a truck's cause by its size.
+    #[test]
+    fn a_wind_scatters_to_all_sides() {
+        let zero = [0.0; crate::param::PARAMS];
+        let mut theta = zero;
+        theta[P::WindX as usize] = 3.0;
+        theta[P::WindY as usize] = -4.0;
+        theta[P::Mass as usize] = 0.1;
+        let sizes = [P::WindX, P::WindY, P::Mass];
+        let mut directions = directions(&sizes, &theta);
+        let course = Course::of(&sizes, &mut directions);
+        let sigma = course.deviations(directions.len(), &theta, &zero);
+        assert_eq!(sigma[..2], [WEATHER * 5.0; 2]);
+        assert_eq!(sigma[2], TAU * 0.1);
+        let hats = &sigma[3..3 + 2 * OF_WEATHER];
+        assert!(hats.iter().all(|x| *x == WEATHER * 5.0), "{hats:?}");
+    }
 
     /// The truck model's catalogue says who gives a cause's law; the courses follow it, but for the
     /// signals over which a form is fitted.

@@ -3,14 +3,16 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::course::Course;
 use crate::decisions::{
     DISPERSION_PRIOR, LONELY, MIN_SIGMAS, OWN_SIZES, OWN_SIZES_PART, PRIOR_CAUSE, SHARED,
     STRONG_NATS, WORTH,
 };
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
+use crate::param::P;
 use crate::problem::Direction;
-use crate::refit::{Fit, prior};
+use crate::refit::{Fit, Prior, prior};
 use crate::stats::evidence;
 use crate::weights::log_odds;
 
@@ -118,26 +120,26 @@ impl dyn Evidence + '_ {
     /// the joint fit).
     pub(crate) fn gate(&self, fit: Fit, empty: &Fit) -> Fit {
         let mut fit = fit;
-        let mut fewer = self.each_left_out(&fit, empty);
-        let mut i = 0;
-        while i < fit.set.len() {
-            let hyp = &CATALOGUE[fit.set[i]];
-            let size = hyp.size(&fit.theta, self.zero()).abs();
-            let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, i);
+        loop {
+            let fewer = self.each_left_out(&fit, empty);
             let nats = Self::lost(&fit, &fewer);
-            let Some(without) = &fewer[i] else { return empty.clone() };
-            let weather = hyp.nonlinear() && Self::from_one_drive(&fit, i, without);
-            // The set without it is more probable (the median probability model: Barbieri and Berger,
-            // Ann. Statist. 32, 2004).
-            let unlikely =
-                nats.len() > 1 && self.worth(&fit, i, &nats) + log_odds(PRIOR_CAUSE) < 0.0;
-            if small || weather || unlikely || self.folds(&fit, i) < STRONG_NATS {
-                fit = without.clone();
-                fewer = self.each_left_out(&fit, empty);
-                i = 0;
-            } else {
-                i += 1;
-            }
+            let doubtful = (0..fit.set.len()).filter(|i| {
+                let hyp = &CATALOGUE[fit.set[*i]];
+                let size = hyp.size(&fit.theta, self.zero()).abs();
+                let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, *i);
+                let one = |f: &Fit| hyp.nonlinear() && Self::from_one_drive(&fit, *i, f);
+                let weather = fewer[*i].as_ref().is_none_or(one);
+                // The set without it is more probable (the median probability model: Barbieri and
+                // Berger, Ann. Statist. 32, 2004).
+                let unlikely =
+                    nats.len() > 1 && self.worth(&fit, *i, &nats) + log_odds(PRIOR_CAUSE) < 0.0;
+                small || weather || unlikely || self.folds(&fit, *i) < STRONG_NATS
+            });
+            // The weakest first: beside a cause that is not there the true one may look doubtful, too.
+            let weakest = doubtful.min_by(|i, j| nats[*i].total_cmp(&nats[*j]));
+            let Some(weakest) = weakest else { break };
+            let Some(without) = &fewer[weakest] else { return empty.clone() };
+            fit = without.clone();
         }
         fit
     }
@@ -157,24 +159,31 @@ impl dyn Evidence + '_ {
         })
     }
 
-    /// A size of the `i`-th member is beyond what the drives disagree about. Its own course, which
-    /// vanishes with it, is no reason that it might be nothing.
+    /// A size of the `i`-th member is beyond what the drives disagree about, once its own course has
+    /// taken what it can of their disagreement, or without: a course vanishes with its cause and is no
+    /// reason that it might be nothing. Nor is that its form is not known (a wind pushes further
+    /// forward, or blows harder): forms stay where they are, with them a size of nothing is no effect.
     fn stands_out(&self, fit: &Fit, member: usize) -> bool {
-        let sizes = CATALOGUE[fit.set[member]].sizes;
-        let keep: Vec<usize> = (0..=fit.free.len()).collect();
-        let others = fit.course.without(sizes);
-        let Some(gram) = others.taken_out(&fit.whole, &keep, &fit.theta, self.zero()) else {
-            return false;
+        let own = CATALOGUE[fit.set[member]].sizes;
+        let sizes = fit.sizes();
+        let of: Vec<usize> =
+            (0..fit.free.len()).filter(|j| sizes.contains(&fit.free[*j])).collect();
+        let keep: Vec<usize> = core::iter::once(0).chain(of.iter().map(|j| j + 1)).collect();
+        let free: Vec<P> = of.iter().map(|j| fit.free[*j]).collect();
+        let priors: Vec<Prior> = of.iter().map(|j| fit.priors[*j]).collect();
+        let sigma: Vec<f64> = priors.iter().map(|p| p.sigma).collect();
+        let beyond = |course: &Course| -> Option<bool> {
+            let gram = course.taken_out(&fit.whole, &keep, &fit.theta, self.zero())?;
+            let (covariance, _) = evidence::posterior(&gram.total().0, &sigma)?;
+            let (free, priors) = (free.clone(), priors.clone());
+            let of_sizes = Fit { free, priors, gram, covariance, ..fit.clone() };
+            let variances = self.variances(&of_sizes);
+            Some(of_sizes.free.iter().zip(&variances).any(|(p, v)| {
+                let x = fit.theta[*p as usize] - self.zero()[*p as usize];
+                own.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
+            }))
         };
-        let sigma: Vec<f64> = fit.priors.iter().map(|p| p.sigma).collect();
-        let Some((covariance, _)) = evidence::posterior(&gram.total().0, &sigma) else {
-            return false;
-        };
-        let variances = self.variances(&Fit { gram, covariance, ..fit.clone() });
-        fit.free.iter().zip(&variances).any(|(p, v)| {
-            let x = fit.theta[*p as usize] - self.zero()[*p as usize];
-            sizes.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
-        })
+        [&fit.course.without(own), &fit.course].into_iter().any(|c| beyond(c).unwrap_or(false))
     }
 
     /// Gain of the `i`-th member on unseen halves of the drives, nats. Its own course is not taken

@@ -98,7 +98,10 @@ impl Problem<'_> {
     fn part(&self, at: &Point, part: &Part, place: usize, residuals: &[Rest]) -> Option<Shape> {
         let (p, module) = (part.p, part.module);
         let whole = Direction::new(p, Vec::new(), p.spec().step);
-        let hat = |knot| Direction { hat: Some(Hat { signal: place, knot }), ..whole.clone() };
+        let hat = |knot| Direction {
+            hat: Some(Hat { signal: place, knot, last: HATS - 1 }),
+            ..whole.clone()
+        };
         let directions: Vec<Direction> =
             (0..HATS).map(hat).chain(at.directions.iter().cloned()).collect();
         let gram = self.gram(&at.theta, &directions);
@@ -126,7 +129,8 @@ impl Problem<'_> {
         let firm = log_z - 0.5 * b.dot(&w) * (1.0 - 1.0 / dispersion(&systems, &a, &w)?);
         let f = &factor * &w;
         let signal = SIGNALS.get(place)?;
-        let knots = self.knots(module, place);
+        let [from, to] = self.ends(module, place);
+        let knot = |k: usize| from + (to - from) * k as f64 / (HATS - 1) as f64;
         Some(Shape {
             module,
             signal: signal.name,
@@ -134,7 +138,7 @@ impl Problem<'_> {
             acts: Acts::Part(part.words),
             log_z,
             firm,
-            knots: knots.into_iter().zip(f.iter().copied()).collect(),
+            knots: f.iter().enumerate().map(|(k, y)| (knot(k), *y)).collect(),
             explained_frac: self.explained(module, residuals, 2.0 * b.dot(&w) - (&a * &w).dot(&w)),
         })
     }

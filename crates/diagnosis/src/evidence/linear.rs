@@ -5,7 +5,6 @@ use std::sync::Arc;
 use nalgebra::DMatrix;
 
 use super::Evidence;
-use crate::course::HATS;
 use crate::hypothesis::CATALOGUE;
 use crate::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, Hat};
@@ -48,7 +47,7 @@ impl LinearDrive {
     /// Rows times a hat function of their place.
     fn under(&self, rows: Vec<f64>, hat: Option<Hat>) -> Vec<f64> {
         let Some(hat) = hat else { return rows };
-        let knots = (HATS - 1) as f64;
+        let knots = hat.last as f64;
         let place = |i: usize| i as f64 / (rows.len() - 1) as f64 * knots;
         let weight = |i: usize| (1.0 - (place(i) - hat.knot as f64).abs()).max(0.0);
         rows.iter().enumerate().map(|(i, x)| x * weight(i)).collect()

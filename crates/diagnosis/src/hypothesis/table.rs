@@ -21,6 +21,9 @@ const METERS: &[C] = &[C::FuelRateGS, C::Co2RateGS];
 
 /// No shape to begin with.
 const ONE: &[Start] = &[[0.0; 2]];
+/// A side force turns the truck one way or the other by where it acts: between the two lies a share
+/// that turns it not at all, which no fit passes.
+const EITHER_SIDE: &[Start] = &[[0.0, 0.0], [0.2, 0.0]];
 /// A meter of a rate may be off by a factor, or more the higher the rate.
 const RATES: &[Start] = &[[0.0, 0.0], [1.0, 0.0]];
 
@@ -53,8 +56,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         .along(&[Open("speed_m_s"), Open("time_s")]),
     h("air_drag", &[P::Drag], &[], ONE, LONG, 0.05, 0.0).along(&[Open("time_s")]),
     h("headwind", &[P::Headwind], &[], ONE, LONG, 0.8, 0.0).along(&[Weather("time_s")]),
-    h("wind", &[P::WindX, P::WindY], &[P::WindShare, P::WindBehind], ONE, WITH_HEADING, 2.0, 0.0)
-        .along(&[Weather("time_s")]),
+    h(
+        "wind",
+        &[P::WindX, P::WindY],
+        &[P::WindShare, P::WindBehind],
+        EITHER_SIDE,
+        WITH_HEADING,
+        2.0,
+        0.0,
+    )
+    .along(&[Weather("time_s")]),
     h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0)
         .along(&[Open("grade_frac"), Open("accel_y_m_s2")]),
     h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0)
@@ -270,8 +281,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     .along(&[Open("curvature_1_m")]),
     h("engine_brake_torque", &[P::EngineBrakeScale], &[], ONE, WITH_STAGE, 0.06, 0.0)
         .along(&[Open("engine_speed_rpm")]),
-    h("crosswind", &[P::Crosswind], &[P::CrosswindShare, P::CrosswindBehind], ONE, STEERING, 1.0, 0.0)
-        .along(&[Weather("time_s")]),
+    h(
+        "crosswind",
+        &[P::Crosswind],
+        &[P::CrosswindShare, P::CrosswindBehind],
+        EITHER_SIDE,
+        STEERING,
+        1.0,
+        0.0,
+    )
+    .along(&[Weather("time_s")]),
     h("fuel_flow_scale", &[P::FuelFlow], &[P::FuelFlowPower], RATES, METERS, 0.02, 0.0)
         .along(&[Open("engine_speed_rpm"), Open("time_s")]),
     h("co2_scale", &[P::Co2Scale], &[P::Co2Power], RATES, METERS, 0.03, 0.0)

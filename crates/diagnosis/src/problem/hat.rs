@@ -4,7 +4,6 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use super::{Hat, Problem};
-use crate::course::HATS;
 use crate::replay::Module;
 use crate::signal::{SIGNALS, means};
 
@@ -14,9 +13,9 @@ const TAIL: f64 = 0.02;
 /// A signal over the rows of a module.
 #[derive(Debug)]
 struct Places {
-    /// Values at the knots.
-    knots: [f64; HATS],
-    /// Places of rows between the knots, 0 to `HATS - 1`, per drive.
+    /// Values at the first and the last knot.
+    ends: [f64; 2],
+    /// Places of rows between these, 0 to 1, per drive.
     rows: Vec<Vec<f64>>,
 }
 
@@ -28,13 +27,14 @@ impl Problem<'_> {
     /// Rows of a module times a hat function.
     pub(super) fn under_hat(&self, i: usize, module: Module, hat: Hat, rows: &[f64]) -> Vec<f64> {
         let places = self.places(module, hat.signal);
-        let weight = |x: &f64| (1.0 - (x - hat.knot as f64).abs()).max(0.0);
+        let [knot, last] = [hat.knot, hat.last].map(|x| x as f64);
+        let weight = |x: &f64| (1.0 - (x * last - knot).abs()).max(0.0);
         rows.iter().zip(&places.rows[i]).map(|(r, x)| r * weight(x)).collect()
     }
 
-    /// Values of a signal at the knots of its hats over a module.
-    pub(crate) fn knots(&self, module: Module, signal: usize) -> [f64; HATS] {
-        self.places(module, signal).knots
+    /// Values of a signal at the first and the last knot of its hats over a module.
+    pub(crate) fn ends(&self, module: Module, signal: usize) -> [f64; 2] {
+        self.places(module, signal).ends
     }
 
     fn places(&self, module: Module, signal: usize) -> Arc<Places> {
@@ -54,14 +54,13 @@ impl Problem<'_> {
         valid.sort_by(f64::total_cmp);
         let at = |part: f64| valid.get((part * valid.len() as f64) as usize).copied();
         let (lo, hi) = (at(TAIL).unwrap_or(0.0), at(1.0 - TAIL).unwrap_or(0.0));
-        let width = ((hi - lo) / (HATS - 1) as f64).max(1e-9);
+        let width = (hi - lo).max(1e-9);
         let place = |x: &f64| {
             let x = (x - lo) / width;
-            if x.is_finite() { x.clamp(0.0, (HATS - 1) as f64) } else { 0.0 }
+            if x.is_finite() { x.clamp(0.0, 1.0) } else { 0.0 }
         };
         let rows = values.iter().map(|x| x.iter().map(place).collect()).collect();
-        let knots = core::array::from_fn(|k| lo + k as f64 * width);
-        let places = Arc::new(Places { knots, rows });
+        let places = Arc::new(Places { ends: [lo, lo + width], rows });
         if let Ok(mut known) = self.hats.0.lock() {
             known.insert(key, places.clone());
         }

@@ -80,12 +80,14 @@ pub(crate) struct Direction {
     pub(crate) hat: Option<Hat>,
 }
 
-/// One of the [`HATS`](crate::course::HATS) hat functions over a signal.
+/// One of some hat functions over a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Hat {
     /// Index into [`SIGNALS`](crate::signal::SIGNALS).
     pub(crate) signal: usize,
+    /// Its number, and that of the last one.
     pub(crate) knot: usize,
+    pub(crate) last: usize,
 }
 
 impl Direction {

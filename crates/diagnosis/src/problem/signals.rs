@@ -6,7 +6,6 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{Direction, Problem, inner, moves};
-use crate::course::HATS;
 use crate::param::{SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
 
@@ -154,9 +153,11 @@ impl Problem<'_> {
         for (p, v) in &direction.shape {
             t[*p as usize] = *v;
         }
-        let hat = direction.hat.map_or(0, |h| 1 + (h.signal * HATS + h.knot) as u64);
-        let key: Key = [group as u64, direction.p as u64, direction.step.to_bits(), hat]
+        let hat =
+            direction.hat.map_or([0; 3], |h| [1 + h.signal, h.knot, h.last].map(|x| x as u64));
+        let key: Key = [group as u64, direction.p as u64, direction.step.to_bits()]
             .into_iter()
+            .chain(hat)
             .chain(seen(group, theta))
             .chain(seen(group, &t))
             .collect();

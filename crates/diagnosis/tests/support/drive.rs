@@ -156,9 +156,11 @@ pub(crate) fn drive(
         let service_n = 400.0 * pressure * f.brake_scale * a.friction;
         brake_k += STEP_S * (service_n * v / 200e3 - brake_k / 600.0);
         // Air.
-        let (sin, cos) = (heading - f.wind_turns_rad * (time_s / 70.0 + begun).sin()).sin_cos();
+        let weather = (time_s / 70.0 + begun).sin();
+        let (sin, cos) = (heading - f.wind_turns_rad * weather).sin_cos();
         let along = v + f.headwind - f.wind[0] * cos - f.wind[1] * sin;
-        let across = f.crosswind + f.wind[1] * cos - f.wind[0] * sin;
+        let across =
+            f.crosswind * (1.0 + f.crosswind_swells * weather) + f.wind[1] * cos - f.wind[0] * sin;
         let yaw_deg = (across / along.abs().max(1.0)).atan().to_degrees();
         let stream = along.hypot(across);
         let drag = 0.5 * density * f.drag_area * (1.0 + 0.018 * yaw_deg.abs()) * stream * along;

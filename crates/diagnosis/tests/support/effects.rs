@@ -159,6 +159,7 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
                 f.crosswind += x;
                 f.side_share = shape.at(1, 0.15, 0.45);
                 f.side_behind_m = shape.at(2, -1.0, 1.0);
+                f.crosswind_swells = shape.at(3, 0.0, 0.3);
             }
             _ => {}
         }

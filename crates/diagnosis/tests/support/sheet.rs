@@ -93,8 +93,9 @@ pub(crate) struct Figures {
     pub(crate) side_share: f64,
     /// How far behind the trailer's CG the rest of it acts, m.
     pub(crate) side_behind_m: f64,
-    /// How far the wind turns to and fro, rad.
+    /// How far the wind turns to and fro, rad, and part by which a crosswind swells and falls.
     pub(crate) wind_turns_rad: f64,
+    pub(crate) crosswind_swells: f64,
     pub(crate) grade_bias: f64,
     pub(crate) map_shift_m: f64,
     pub(crate) speed_scale: f64,
@@ -136,6 +137,7 @@ impl Figures {
         side_share: 0.25,
         side_behind_m: 0.0,
         wind_turns_rad: 0.0,
+        crosswind_swells: 0.0,
         grade_bias: 0.0,
         map_shift_m: 0.0,
         speed_scale: 1.0,
