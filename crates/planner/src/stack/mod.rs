@@ -318,7 +318,7 @@ impl Stack {
         plan.speed_status = self.tactics.speed_status;
         if tactical.new_speed {
             plan.speed.clear();
-            plan.speed.extend_from_slice(self.tactics.speed_points());
+            plan.speed.extend(self.tactics.speed_points());
         }
         if tactical.new_path {
             publish_path(&mut plan.path, &tactical.path, at.road, at.ego);

@@ -288,10 +288,10 @@ impl NativeTraffic {
             self.engine.ego.clear();
             return;
         }
-        let heading = self.road.at(ego.s_m, ego.d_m).heading_rad;
+        let heading = self.road.line().heading_rad(ego.s_m);
         let shift_m = -ego.speed_m_s * now.seconds_since(tick);
-        let map = self.engine.map.clone();
-        self.engine.ego.update(ego, &self.geometry, &map, heading, shift_m);
+        let Engine { ego: spans, map, .. } = &mut self.engine;
+        spans.update(ego, &self.geometry, map, heading, shift_m);
     }
 }
 
