@@ -184,7 +184,7 @@ impl Shared {
         let with = |seed: u64| scenario.traffic.demand(seed);
         let geometry = limits.geometry;
         let mut traffic = NativeTraffic::new(Arc::clone(&self.road), geometry, with(0))?;
-        traffic.set_map_poses(false);
+        traffic.set_map_poses_within_m(-1.0);
         let mut pool = vec![traffic.snapshot()];
         for seed in 1..POOL {
             let road = Arc::clone(&self.road);
@@ -210,7 +210,8 @@ impl Shared {
             scenario.ego.s_m += further_m;
             let (road, truck) = (Arc::clone(&self.road), Arc::clone(&self.model));
             let start_s_m = scenario.ego.s_m;
-            let world = World::assemble(&scenario, seed, road, truck)?;
+            let mut world = World::assemble(&scenario, seed, road, truck)?;
+            world.only_collisions();
             return Ok((Body::Truck(Box::new(world)), start_s_m));
         };
         let mut kinematic = match former {
