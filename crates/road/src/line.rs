@@ -177,6 +177,9 @@ impl Line {
     #[must_use]
     pub fn curvature_1_m(&self, s_m: f64) -> (f64, f64) {
         let s = s_m.clamp(0.0, self.length_m);
+        if self.curved_at_most_1_m == 0.0 {
+            return (s, 0.0);
+        }
         let cell = &self.cells[self.cell(s)];
         (s, cell.local(s - cell.s_m).curvature_1_m())
     }

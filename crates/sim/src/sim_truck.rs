@@ -50,13 +50,25 @@ impl SimTruck {
         start: &EgoStart,
         weather: &Weather,
     ) -> Result<Self, SimError> {
-        let refuse = |why: String| SimError::Scenario { name: "ego".into(), why };
         let limits = model.vehicle_limits_in(&RoadPatch {
             wind_m_s: (weather.wind_x_m_s, weather.wind_y_m_s),
             air_temperature_k: weather.air_temperature_k,
             air_pressure_pa: weather.air_pressure_pa,
             ..RoadPatch::default()
         })?;
+        Self::with_limits(model, road, start, weather, limits)
+    }
+
+    /// As [`Self::new`], with the limits of such a truck in this weather, which take longer to work
+    /// out than the rest.
+    pub(crate) fn with_limits(
+        model: Arc<TruckModel>,
+        road: Arc<Road>,
+        start: &EgoStart,
+        weather: &Weather,
+        limits: VehicleLimits,
+    ) -> Result<Self, SimError> {
+        let refuse = |why: String| SimError::Scenario { name: "ego".into(), why };
         let needs_m = limits.geometry.rear_m();
         if start.s_m < needs_m || start.s_m + limits.geometry.front_m >= road.length_m() {
             return Err(refuse(format!(

@@ -87,8 +87,8 @@ impl EgoSpans {
         }
         let middle = 0.5 * (rear + front);
         for (k, lane) in map.lanes.iter().enumerate() {
-            let half = 0.5 * lane.width_m(middle) - MARGIN_M;
-            let center = lane.center_d_m(middle);
+            let (center, width) = lane.center_and_width_m(middle);
+            let half = 0.5 * width - MARGIN_M;
             if lane.s_end_m < rear
                 || lane.s_start_m > front
                 || low > center + half

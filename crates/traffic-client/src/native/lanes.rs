@@ -72,16 +72,17 @@ impl Lane {
         self.center_d_m[k] + f * (self.center_d_m[k + 1] - self.center_d_m[k])
     }
 
+    /// [`Self::center_d_m`] and the width, m.
+    pub(crate) fn center_and_width_m(&self, s_m: f64) -> (f64, f64) {
+        let (k, f) = self.cell(s_m);
+        let at = |table: &[f64]| table[k] + f * (table[k + 1] - table[k]);
+        (at(&self.center_d_m), at(&self.width_m))
+    }
+
     /// Slope of the centre against the reference line, dimensionless, positive to the left.
     pub(crate) fn slope(&self, s_m: f64) -> f64 {
         let k = self.cell(s_m).0;
         (self.center_d_m[k + 1] - self.center_d_m[k]) * CELLS_PER_M
-    }
-
-    /// Width, m.
-    pub(crate) fn width_m(&self, s_m: f64) -> f64 {
-        let (k, f) = self.cell(s_m);
-        self.width_m[k] + f * (self.width_m[k + 1] - self.width_m[k])
     }
 
     /// Limits and neighbours at a station.

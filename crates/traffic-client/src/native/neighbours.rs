@@ -109,7 +109,7 @@ fn nearer(far: &[u32], near: &[u32]) -> Vec<u32> {
     far.iter().zip(near).map(|(&f, &n)| if n == NOBODY { f } else { n }).collect()
 }
 
-fn look([own, left, right]: [u16; 3], nearest: &[u32]) -> [u32; 3] {
+fn look(own: u16, left: u16, right: u16, nearest: &[u32]) -> [u32; 3] {
     let spare = nearest.len() - 1;
     let own = nearest[own as usize];
     if left == NO_LANE && right == NO_LANE {
@@ -139,13 +139,14 @@ impl Seen<'_> {
                 if look_aside(i) { self.map.beside(lane, s_m) } else { (NO_LANE, NO_LANE) };
             if let Some((lanes, leader)) = found.next() {
                 *lanes = [lane, beside.0, beside.1];
-                *leader = look(*lanes, nearest);
+                // Not read back, which would wait for the three to be stored.
+                *leader = look(lane, beside.0, beside.1, nearest);
             }
         });
         let mut found = lanes.iter().zip(follower);
         self.visit_back_first(range, behind, |_, _, _, nearest| {
             if let Some((lanes, follower)) = found.next() {
-                *follower = look(*lanes, nearest);
+                *follower = look(lanes[OWN], lanes[LEFT], lanes[RIGHT], nearest);
             }
         });
     }
