@@ -60,6 +60,10 @@ pub(super) struct Wish {
 impl Engine {
     /// The lane change that vehicle `i` has to make, if any.
     fn need(&self, i: usize) -> Option<Need> {
+        if self.map.has_needs() || self.is_eventful() { self.need_here(i) } else { None }
+    }
+
+    fn need_here(&self, i: usize) -> Option<Need> {
         let fleet = &self.state.fleet;
         if self.is_eventful()
             && let Some((side, distance_m)) = self.happening_need(i)

@@ -295,13 +295,12 @@ impl Engine {
     fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize, acting: Range<usize>) {
         let (fleet, map, tick) = (&self.state.fleet, &*self.map, self.state.tick);
         let (near, range) = (self.near(), self.looked_at(&acting));
-        let eventful = self.is_eventful();
+        let (eventful, has_needs) = (self.is_eventful(), map.has_needs());
         let looks_aside = |i: usize| {
             !near.contains(&i)
                 || is_due(tick, fleet.id[i])
                 || fleet.is_changing(i)
-                || fleet.driver[i].exit != NO_LANE
-                || map.ends_early(fleet.lane[i])
+                || has_needs && (fleet.driver[i].exit != NO_LANE || map.ends_early(fleet.lane[i]))
                 || eventful
         };
         let seen = Seen { fleet, map, ego: &self.ego };

@@ -79,10 +79,12 @@ impl Lane {
         (at(&self.center_d_m), at(&self.width_m))
     }
 
-    /// Slope of the centre against the reference line, dimensionless, positive to the left.
-    pub(crate) fn slope(&self, s_m: f64) -> f64 {
-        let k = self.cell(s_m).0;
-        (self.center_d_m[k + 1] - self.center_d_m[k]) * CELLS_PER_M
+    /// [`Self::center_d_m`], and its slope against the reference line, dimensionless, positive to
+    /// the left.
+    pub(crate) fn center_and_slope(&self, s_m: f64) -> (f64, f64) {
+        let (k, f) = self.cell(s_m);
+        let (from_m, to_m) = (self.center_d_m[k], self.center_d_m[k + 1]);
+        (from_m + f * (to_m - from_m), (to_m - from_m) * CELLS_PER_M)
     }
 
     /// Limits and neighbours at a station.
@@ -191,6 +193,7 @@ pub struct LaneMap {
     ends_early: Vec<bool>,
     left_of_three: Vec<bool>,
     one_limit: bool,
+    needs: bool,
     /// Lanes to the left and right, where they are the same from the start of the road to its end.
     beside_throughout: Vec<Option<(u16, u16)>>,
 }
@@ -212,7 +215,7 @@ impl LaneMap {
         if sin_grade.windows(2).all(|w| w[0] == w[1]) {
             sin_grade.truncate(1);
         }
-        let ends_early = lanes
+        let ends_early: Vec<bool> = lanes
             .iter()
             .map(|lane| (lane.drops || lane.leaves) && lane.s_end_m < s_end_m - 1.0)
             .collect();
@@ -221,6 +224,7 @@ impl LaneMap {
         let mut sections = lanes.iter().flat_map(|lane| &lane.sections).map(rules);
         let first = sections.next();
         let one_limit = sections.all(|rules| Some(rules) == first);
+        let needs = !exits.is_empty() || ends_early.contains(&true);
         let is_throughout = |k: u16| {
             let whole = |l: &Lane| l.s_start_m <= s_start_m && l.s_end_m >= s_end_m;
             k == NO_LANE || lanes.get(k as usize).is_some_and(whole)
@@ -239,9 +243,15 @@ impl LaneMap {
             ends_early,
             left_of_three,
             one_limit,
+            needs,
             beside_throughout: beside_throughout.collect(),
             lanes,
         }
+    }
+
+    /// Does anybody on it have to change lanes, if nothing happens?
+    pub(crate) fn has_needs(&self) -> bool {
+        self.needs
     }
 
     /// Does one speed limit hold in all lanes, all along?

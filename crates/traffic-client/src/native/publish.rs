@@ -56,8 +56,8 @@ pub(crate) fn publish(
         let rear_s_m = front_s_m - driver.length_m;
         let middle_m = 0.5 * (front_s_m + rear_s_m);
         let lane = &map.lanes[fleet.lane[i] as usize];
-        let mut d_m = lane.center_d_m(middle_m);
-        let mut lateral_speed_m_s = lane.slope(middle_m) * speed_m_s;
+        let (mut d_m, slope) = lane.center_and_slope(middle_m);
+        let mut lateral_speed_m_s = slope * speed_m_s;
         let target = fleet.target[i];
         if target != NO_LANE {
             let (done, rate) = quintic((fleet.clock_s[i] + tau_s) / driver.lane_change_s);
