@@ -86,7 +86,7 @@ impl EgoState {
     /// # Errors
     /// [`CoreError::NonFinite`] names the first offending field.
     pub fn check_finite(&self) -> Result<(), CoreError> {
-        crate::error::finite(self.numbers())
+        if self.is_finite() { Ok(()) } else { crate::error::finite(self.numbers()) }
     }
 
     /// Whether every number is finite.

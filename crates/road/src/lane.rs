@@ -77,6 +77,7 @@ impl LaneTrack {
     }
 
     /// Offset of the lane's centre from the reference line, m, positive left.
+    #[inline]
     #[must_use]
     pub fn center_d_m(&self, s_m: f64) -> f64 {
         self.center.at(s_m)
@@ -89,6 +90,7 @@ impl LaneTrack {
     }
 
     /// Width, m.
+    #[inline]
     #[must_use]
     pub fn width_m(&self, s_m: f64) -> f64 {
         self.width.at(s_m)

@@ -42,5 +42,5 @@ pub use findings::{Finding, Severity};
 pub use geo::GeoReference;
 pub use lane::{LaneEnd, LaneKind, LaneSource, LaneTrack};
 pub use line::{Knot, Line};
-pub use road::{ProfilePoint, Road, RoadObject, RoadPoint, RoadPosition};
+pub use road::{ProfilePoint, Road, RoadObject, RoadPoint, RoadPosition, Surface};
 pub use shape::{Jet, Placed, Shape};

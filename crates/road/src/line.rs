@@ -45,6 +45,7 @@ pub struct Line {
     length_m: f64,
     elevation: Cubics,
     bank: Cubics,
+    curved_at_most_1_m: f64,
 }
 
 impl Line {
@@ -95,14 +96,15 @@ impl Line {
         baker.finish(elevation, bank)
     }
 
-    pub(crate) const fn from_cells(
+    pub(crate) fn from_cells(
         cells: Vec<Cell>,
         buckets: Vec<u32>,
         length_m: f64,
         elevation: Cubics,
         bank: Cubics,
     ) -> Self {
-        Self { cells, buckets, length_m, elevation, bank }
+        let curved_at_most_1_m = cells.iter().map(|c| c.curved_at_most_1_m).fold(0.0, f64::max);
+        Self { cells, buckets, length_m, elevation, bank, curved_at_most_1_m }
     }
 
     /// Length, m.
@@ -175,8 +177,19 @@ impl Line {
     #[must_use]
     pub fn curvature_1_m(&self, s_m: f64) -> (f64, f64) {
         let s = s_m.clamp(0.0, self.length_m);
+        if self.curved_at_most_1_m == 0.0 {
+            return (s, 0.0);
+        }
         let cell = &self.cells[self.cell(s)];
         (s, cell.local(s - cell.s_m).curvature_1_m())
+    }
+
+    /// The heading alone, rad: as [`Line::at`] at a part of its cost.
+    #[must_use]
+    pub fn heading_rad(&self, s_m: f64) -> f64 {
+        let s = s_m.clamp(0.0, self.length_m);
+        let cell = &self.cells[self.cell(s)];
+        cell.heading_rad + turned_rad(cell.local(s - cell.s_m).first)
     }
 
     /// A bound of the curvature between two stations, 1/m: nowhere there is [`Line::curvature_1_m`]
@@ -189,6 +202,12 @@ impl Line {
             most_1_m = most_1_m.max(cell.curved_at_most_1_m);
         }
         most_1_m
+    }
+
+    /// The bound of [`Line::curved_at_most_1_m`] for the whole line, 1/m.
+    #[must_use]
+    pub const fn curved_anywhere_at_most_1_m(&self) -> f64 {
+        self.curved_at_most_1_m
     }
 
     /// The height alone, m: as [`Line::at`] at a part of its cost.
@@ -217,13 +236,12 @@ impl Line {
         let local = cell.local(s_m - cell.s_m);
         let ([u, v], [du, dv]) = (local.point, local.first);
         let speed = libm::sqrt(du * du + dv * dv);
-        let turned = if du > 0.0 { small::atan(dv / du) } else { libm::atan2(dv, du) };
         let (z_m, slope) = self.elevation.at_with_slope(s_m);
         let knot = Knot {
             s_m,
             x_m: cell.x_m + cell.cos * u - cell.sin * v,
             y_m: cell.y_m + cell.sin * u + cell.cos * v,
-            heading_rad: cell.heading_rad + turned,
+            heading_rad: cell.heading_rad + turned_rad([du, dv]),
             curvature_1_m: local.curvature_1_m(),
             z_m,
             slope,
@@ -309,4 +327,9 @@ impl Line {
         let across = (y_m - k.y_m) * cos - (x_m - k.x_m) * sin;
         (across.abs() <= REACH_M).then_some((s, across))
     }
+}
+
+/// Direction of a tangent in the axes of its cell, rad.
+fn turned_rad([du, dv]: [f64; 2]) -> f64 {
+    if du > 0.0 { small::atan(dv / du) } else { libm::atan2(dv, du) }
 }

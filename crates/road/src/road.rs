@@ -24,6 +24,17 @@ pub struct RoadPoint {
     pub bank_rad: f64,
 }
 
+/// How the road surface lies at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Surface {
+    /// Map z, m (bank included).
+    pub z_m: f64,
+    /// Grade, rad, positive uphill.
+    pub grade_rad: f64,
+    /// Bank, rad, left side up.
+    pub bank_rad: f64,
+}
+
 /// A position in road coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RoadPosition {
@@ -84,6 +95,7 @@ pub struct Road {
     objects: Vec<RoadObject>,
     geo_reference: Option<GeoReference>,
     limit_cap_m_s: Option<f64>,
+    paved_throughout_m: Option<(f64, f64)>,
 }
 
 impl Road {
@@ -114,6 +126,7 @@ impl Road {
             return Err(bad("a lane must end after its start"));
         }
         let sections = sections(&lanes, line.length_m());
+        let paved_throughout_m = paved_throughout_m(&lanes, line.length_m());
         Ok(Self {
             name: name.into(),
             line,
@@ -123,6 +136,7 @@ impl Road {
             objects: Vec::new(),
             geo_reference: None,
             limit_cap_m_s: None,
+            paved_throughout_m,
         })
     }
 
@@ -220,6 +234,16 @@ impl Road {
             grade_rad: small::atan(k.slope),
             bank_rad: k.bank_rad,
         }
+    }
+
+    /// How the surface lies at (s, d), alone: as [`Road::at`] at a part of its cost.
+    #[must_use]
+    pub fn surface(&self, s_m: f64, d_m: f64) -> Surface {
+        let s_m = s_m.clamp(0.0, self.length_m());
+        let (z_m, slope) = self.line.elevation().at_with_slope(s_m);
+        let bank_rad = self.line.bank().at(s_m);
+        let (sin_bank, _) = small::sincos(bank_rad);
+        Surface { z_m: z_m + d_m * sin_bank, grade_rad: small::atan(slope), bank_rad }
     }
 
     /// Road coordinates of a map point; fast near a hint. `None` for a non-finite point.
@@ -363,6 +387,13 @@ impl Road {
         }
     }
 
+    /// Offsets, m, right and left, between which the whole road is paved ([`Road::is_paved`]) by
+    /// lanes that run straight along it.
+    #[must_use]
+    pub const fn paved_throughout_m(&self) -> Option<(f64, f64)> {
+        self.paved_throughout_m
+    }
+
     /// Whether the surface is paved at (s, d): inside a lane of any kind, hard shoulders included.
     /// Slits between lanes that are narrower than half a metre count as paved.
     #[must_use]
@@ -387,6 +418,25 @@ impl Road {
 #[cfg(feature = "std")]
 fn has_extension(name: &str, want: &str) -> bool {
     std::path::Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case(want))
+}
+
+/// The widest band of lanes side by side that are everywhere and everywhere the same.
+fn paved_throughout_m(lanes: &[LaneTrack], length_m: f64) -> Option<(f64, f64)> {
+    let edges = |l: &LaneTrack| {
+        let (centre_m, half_m) = (l.center.as_constant()?, 0.5 * l.width.as_constant()?);
+        let whole = l.s_start_m <= 0.0 && l.s_end_m >= length_m && half_m > 0.0;
+        whole.then_some((centre_m - half_m, centre_m + half_m))
+    };
+    let mut bands: Vec<(f64, f64)> = lanes.iter().filter_map(edges).collect();
+    bands.sort_by(|a, b| a.0.total_cmp(&b.0));
+    bands.dedup_by(|next, band| {
+        let touches = next.0 <= band.1 + 1e-6;
+        if touches {
+            band.1 = band.1.max(next.1);
+        }
+        touches
+    });
+    bands.into_iter().max_by(|a, b| (a.1 - a.0).total_cmp(&(b.1 - b.0)))
 }
 
 /// Splits the road where a lane begins or ends and orders the lanes of each part by their offset

@@ -160,3 +160,35 @@ fn the_highway_has_the_lanes_limits_and_curves_that_its_description_names() {
         assert!(p.bank_rad * p.curvature_1_m <= 0.0 && p.grade_rad.abs() < 0.06);
     }
 }
+
+#[test]
+fn a_part_of_the_view_is_the_same_bits_as_the_whole() {
+    for road in
+        [builtin::highway(), builtin::highway_sag(), builtin::test_site(), builtin::flat(3e3)]
+    {
+        for s_m in (-20..).map(|i| 7.3 * f64::from(i)).take_while(|s| *s < road.length_m() + 50.0) {
+            let (at, line) = (road.at(s_m, 3.1), road.line());
+            assert_eq!(line.heading_rad(s_m).to_bits(), at.heading_rad.to_bits());
+            assert_eq!(line.curvature_1_m(s_m).1.to_bits(), at.curvature_1_m.to_bits());
+            let surface = road.surface(s_m, 3.1);
+            let is = [surface.z_m, surface.grade_rad, surface.bank_rad].map(f64::to_bits);
+            assert_eq!(is, [at.z_m, at.grade_rad, at.bank_rad].map(f64::to_bits), "{s_m} m");
+            assert!(at.curvature_1_m.abs() <= line.curved_anywhere_at_most_1_m());
+        }
+    }
+}
+
+#[test]
+fn what_is_paved_throughout_is_paved_everywhere() {
+    // Two lanes of 3.75 m from end to end, on the highway with others beside them in places.
+    for road in [builtin::highway(), builtin::flat(3e3)] {
+        let (right_m, left_m) = road.paved_throughout_m().unwrap();
+        assert!((left_m - right_m - 7.5).abs() < 1e-9, "{right_m} {left_m}");
+        for s_m in (0..).map(|i| 7.3 * f64::from(i)).take_while(|s| *s < road.length_m()) {
+            for k in 0..=20 {
+                let d_m = right_m + f64::from(k) / 20.0 * (left_m - right_m);
+                assert!(road.is_paved(s_m, d_m), "{s_m} m, {d_m} m");
+            }
+        }
+    }
+}

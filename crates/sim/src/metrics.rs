@@ -85,6 +85,7 @@ pub struct Metrics {
     guard_activations: u64,
     path_history: VecDeque<(f64, f64)>,
     hash: u64,
+    only_collisions: bool,
 }
 
 impl Metrics {
@@ -119,7 +120,13 @@ impl Metrics {
             guard_activations: 0,
             path_history: VecDeque::new(),
             hash: FNV_OFFSET,
+            only_collisions: false,
         }
+    }
+
+    /// Counts nothing but collisions from now on.
+    pub fn only_collisions(&mut self) {
+        self.only_collisions = true;
     }
 
     /// The figures so far.
@@ -157,13 +164,14 @@ impl Metrics {
 
     /// Vehicles that touch the ego now; a new contact counts one collision.
     fn count_collisions(&mut self, tick: &Tick<'_>) {
-        let near_m = self.geometry.length_m() + 30.0;
-        let ego = Footprint::of_ego(tick.ego, &self.geometry);
+        let near_m = touchable_m(&self.geometry);
+        let mut ego = None;
         let mut touching = Vec::new();
         for n in &tick.scene.neighbours {
             if (n.front_s_m - tick.ego.s_m).abs() > near_m {
                 continue;
             }
+            let ego = ego.get_or_insert_with(|| Footprint::of_ego(tick.ego, &self.geometry));
             let body = Footprint::of_neighbour(n);
             if ego.iter().any(|part| footprints_overlap(part, &body)) {
                 touching.push(n.id);
@@ -195,7 +203,7 @@ impl Metrics {
         if closing_m_s > 0.1 {
             self.min_ttc_s = self.min_ttc_s.min((gap_m / closing_m_s).max(0.0));
         }
-        let grade_rad = self.road.at(ego.s_m, ego.d_m).grade_rad;
+        let grade_rad = self.road.surface(ego.s_m, ego.d_m).grade_rad;
         let brake_m_s2 = self.rss.brake_max_m_s2(ahead.class);
         let safe_m = SafeGap::new(&self.response, brake_m_s2, grade_rad)
             .gap_m(ego.speed_m_s, ahead.speed_m_s);
@@ -265,6 +273,11 @@ impl Metrics {
     }
 }
 
+/// A vehicle whose front is further from the reference point than this cannot touch the truck, m.
+pub(crate) fn touchable_m(geometry: &Geometry) -> f64 {
+    geometry.length_m() + 30.0
+}
+
 /// The nearest vehicle ahead in the ego's swept way.
 pub(crate) fn nearest_ahead<'a>(
     ego: &EgoState,
@@ -284,6 +297,10 @@ const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
 
 impl Recorder for Metrics {
     fn record(&mut self, tick: &Tick<'_>) {
+        if self.only_collisions {
+            self.count_collisions(tick);
+            return;
+        }
         let ego = tick.ego;
         let dt_s = self.last.map_or(0.0, |t| tick.now.seconds_since(t));
         if self.start.is_none() {

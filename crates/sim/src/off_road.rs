@@ -16,6 +16,9 @@ struct Group {
     half_spread_m: f64,
 }
 
+/// What the bound of where the wheels are leaves for rounding and bank, m.
+const MARGIN_M: f64 = 0.1;
+
 /// Watches the wheels of a truck and counts how often and how long one is off the road.
 #[derive(Debug, Clone)]
 pub struct OffRoad {
@@ -45,9 +48,10 @@ impl OffRoad {
     }
 
     /// Looks at the wheels; `dt_s` is the time since the last look. Whether one is off the road.
+    /// Station and offset are those of the place on the map, zero where there are none.
     pub fn watch(&mut self, ego: &EgoState, road: &Road, dt_s: f64) -> bool {
         let before = self.off;
-        self.off = self.is_off(ego, road);
+        self.off = !self.is_surely_on(ego, road) && self.is_off(ego, road);
         if self.off {
             self.time_s += if before { dt_s } else { 0.0 };
             self.events += u32::from(!before);
@@ -73,6 +77,39 @@ impl OffRoad {
         self.off
     }
 
+    /// Whether a bound of how far aside the wheels are says that all are on lanes that run along the
+    /// whole road: nearly always, at a part of the cost of looking at each axle group.
+    fn is_surely_on(&self, ego: &EgoState, road: &Road) -> bool {
+        let Some((right_m, left_m)) = road.paved_throughout_m() else { return false };
+        let (g, line) = (&self.geometry, road.line());
+        let to_hitch_m = g.hitch_ahead_m.abs();
+        let behind_m = to_hitch_m + g.hitch_to_trailer_axle_m;
+        let widest_m = right_m.abs().max(left_m.abs());
+        // The road turns by no more than this per metre driven, however far aside.
+        let bend_1_m = 1.2 * line.curved_anywhere_at_most_1_m();
+        let is_inside = ego.s_m > behind_m && ego.s_m + g.wheelbase_m < road.length_m();
+        if !(is_inside && bend_1_m * widest_m < 0.1) {
+            return false;
+        }
+        let tractor_rad = (ego.yaw_rad - line.heading_rad(ego.s_m)).abs();
+        let trailer_rad = tractor_rad + ego.trailer.articulation_rad.abs();
+        // From the reference point each metre leads aside by the angle to the road that is there.
+        let aside_m =
+            |length_m: f64, turned_rad: f64| length_m * (turned_rad + bend_1_m * length_m);
+        let off_m = [
+            aside_m(g.wheelbase_m, tractor_rad),
+            0.0,
+            aside_m(to_hitch_m, tractor_rad) + aside_m(behind_m, trailer_rad),
+        ];
+        let groups = self.groups.iter().zip(off_m).zip([tractor_rad, tractor_rad, trailer_rad]);
+        groups.into_iter().all(|((group, off_m), turned_rad)| {
+            let turned_rad = turned_rad + bend_1_m * (behind_m + g.wheelbase_m);
+            let half_m = group.half_track_m + group.half_spread_m * turned_rad;
+            let reach_m = off_m + half_m + MARGIN_M;
+            ego.d_m - reach_m > right_m && ego.d_m + reach_m < left_m
+        })
+    }
+
     fn is_off(&self, ego: &EgoState, road: &Road) -> bool {
         let g = &self.geometry;
         let (sin, cos) = libm::sincos(ego.yaw_rad);
@@ -92,7 +129,7 @@ impl OffRoad {
             let at = road.project(ego.x_m + x, ego.y_m + y, Some(ego.s_m + ahead_m));
             // Further from the road than can be projected.
             let Some(at) = at else { return true };
-            let (sin, cos) = libm::sincos(yaw_rad - road.line().at(at.s_m).heading_rad);
+            let (sin, cos) = libm::sincos(yaw_rad - road.line().heading_rad(at.s_m));
             let half_m = group.half_track_m * cos.abs() + group.half_spread_m * sin.abs();
             !road.is_paved(at.s_m, at.d_m + half_m) || !road.is_paved(at.s_m, at.d_m - half_m)
         })
@@ -127,6 +164,26 @@ mod tests {
     }
 
     #[test]
+    fn the_bound_says_yes_only_where_a_look_at_each_axle_group_does() {
+        let (wheels, _) = watched();
+        let road = road::builtin::highway();
+        let (mut sure, mut off) = (0, 0);
+        for i in 0..20_000 {
+            // spread evenly and without a common period
+            let unit = |k: f64| (f64::from(i) * k).fract();
+            let (s_m, d_m) = (20.0 + 14_000.0 * unit(0.618_034), 8.0 * unit(0.754_878) - 4.0);
+            let at = road.at(s_m, d_m);
+            let mut ego = EgoState { s_m, d_m, x_m: at.x_m, y_m: at.y_m, ..EgoState::default() };
+            ego.yaw_rad = at.heading_rad + 0.2 * (unit(0.569_840) - 0.5);
+            ego.trailer.articulation_rad = 0.2 * (unit(0.854_102) - 0.5);
+            let (is_sure, is_off) = (wheels.is_surely_on(&ego, &road), wheels.is_off(&ego, &road));
+            assert!(!(is_sure && is_off), "{ego:?}");
+            (sure, off) = (sure + u32::from(is_sure), off + u32::from(is_off));
+        }
+        assert!(sure > 2_000 && off > 2_000, "{sure} {off}");
+    }
+
+    #[test]
     fn a_trailer_that_swings_out_alone_counts() {
         let (mut wheels, road) = watched();
         let reach = wheels.geometry.hitch_to_trailer_axle_m;
@@ -146,6 +203,7 @@ mod tests {
         assert_eq!(wheels.events(), 2);
         assert!((wheels.time_s() - 0.02).abs() < 1e-12);
         // Far out in the fields there is no road to project to.
-        assert!(wheels.watch(&EgoState { y_m: 5e3, ..ego(0.0, 0.0, 0.0) }, &road, 0.01));
+        let far = EgoState { y_m: 5e3, s_m: 0.0, ..ego(0.0, 0.0, 0.0) };
+        assert!(wheels.watch(&far, &road, 0.01));
     }
 }

@@ -23,6 +23,8 @@ pub struct SimTruck {
     /// Force of the cold retarder, and the share of it that [`Self::limits`] tell.
     cold_retarder_n: Option<Curve>,
     retarder_left_frac: f64,
+    /// Height of the road's start, m.
+    start_z_m: f64,
     plant: TruckState,
     ego: EgoState,
     command: Command,
@@ -48,13 +50,25 @@ impl SimTruck {
         start: &EgoStart,
         weather: &Weather,
     ) -> Result<Self, SimError> {
-        let refuse = |why: String| SimError::Scenario { name: "ego".into(), why };
         let limits = model.vehicle_limits_in(&RoadPatch {
             wind_m_s: (weather.wind_x_m_s, weather.wind_y_m_s),
             air_temperature_k: weather.air_temperature_k,
             air_pressure_pa: weather.air_pressure_pa,
             ..RoadPatch::default()
         })?;
+        Self::with_limits(model, road, start, weather, limits)
+    }
+
+    /// As [`Self::new`], with the limits of such a truck in this weather, which take longer to work
+    /// out than the rest.
+    pub(crate) fn with_limits(
+        model: Arc<TruckModel>,
+        road: Arc<Road>,
+        start: &EgoStart,
+        weather: &Weather,
+        limits: VehicleLimits,
+    ) -> Result<Self, SimError> {
+        let refuse = |why: String| SimError::Scenario { name: "ego".into(), why };
         let needs_m = limits.geometry.rear_m();
         if start.s_m < needs_m || start.s_m + limits.geometry.front_m >= road.length_m() {
             return Err(refuse(format!(
@@ -77,6 +91,7 @@ impl SimTruck {
         })?;
         let d_m = lane.center_d_m(start.s_m);
         let at = road.at(start.s_m, d_m);
+        let start_z_m = road.at(0.0, 0.0).z_m;
         let plant = model.initial_state(at.x_m, at.y_m, at.heading_rad, start.speed_m_s);
         let mut truck = Self {
             model,
@@ -85,12 +100,13 @@ impl SimTruck {
             cold_retarder_n: limits.powertrain.retarder_force_n.clone(),
             retarder_left_frac: 1.0,
             limits,
+            start_z_m,
             plant,
             ego: EgoState { s_m: start.s_m, d_m, ..EgoState::default() },
             command: Command::default(),
             time: Time::ZERO,
         };
-        truck.observe();
+        truck.observe(&truck.patch());
         Ok(truck)
     }
 
@@ -121,11 +137,9 @@ impl SimTruck {
     #[must_use]
     pub fn patch(&self) -> RoadPatch {
         let mapped_m = self.model.parameters().instruments.map_position_m(self.ego.s_m);
-        let at = self.road.at(mapped_m, self.ego.d_m);
-        let start_z = self.road.at(0.0, 0.0).z_m;
-        let climbed = at.z_m - start_z;
+        let at = self.road.surface(mapped_m, self.ego.d_m);
         let w = &self.weather;
-        let (air_temperature_k, air_pressure_pa) = w.air_at(climbed);
+        let (air_temperature_k, air_pressure_pa) = w.air_at(at.z_m - self.start_z_m);
         RoadPatch {
             grade_rad: at.grade_rad,
             bank_rad: at.bank_rad,
@@ -148,14 +162,14 @@ impl SimTruck {
         }
     }
 
-    /// Refreshes the reported state from the plant.
-    fn observe(&mut self) {
+    /// Refreshes the reported state from the plant, which has come here on `patch`.
+    fn observe(&mut self, patch: &RoadPatch) {
         let hint = self.ego.s_m;
-        let mut ego = self.model.ego_state(&self.plant, &self.patch());
+        let mut ego = self.model.ego_state(&self.plant, patch);
         if let Some(p) = self.road.project(ego.x_m, ego.y_m, Some(hint)) {
             (ego.s_m, ego.d_m) = (p.s_m, p.d_m);
         }
-        ego.z_m = self.road.at(ego.s_m, ego.d_m).z_m;
+        ego.z_m = self.road.surface(ego.s_m, ego.d_m).z_m;
         self.ego = ego;
     }
 }
@@ -167,10 +181,10 @@ impl Vehicle for SimTruck {
         let ahead_s = now.seconds_since(self.time);
         if ahead_s >= SUBSTEP_S {
             let steps = libm::floor(ahead_s / SUBSTEP_S + 1e-6);
-            self.plant =
-                self.model.step(&self.plant, &self.command, &self.patch(), steps * SUBSTEP_S)?;
+            let patch = self.patch();
+            self.model.advance(&mut self.plant, &self.command, &patch, steps * SUBSTEP_S)?;
             self.time = self.time.plus_nanos(Time::from_seconds(steps * SUBSTEP_S).0);
-            self.observe();
+            self.observe(&patch);
             self.tell_retarder();
         }
         Ok(Stamped { time: self.time, value: self.model.measured(&self.ego) })

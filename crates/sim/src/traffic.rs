@@ -165,6 +165,15 @@ impl Traffic {
         self.mode
     }
 
+    /// Takes no more fingerprints unless they are compared with a manifest's, and gives vehicles of
+    /// native traffic a map pose only within this distance, m.
+    pub(crate) fn only_near(&mut self, distance_m: f64) {
+        self.inner.inner_mut().stop();
+        if let Engine::Native(native, _) = self.inner.inner_mut().inner_mut() {
+            native.set_map_poses_within_m(distance_m);
+        }
+    }
+
     /// The speed limit of the whole road at a time (s), m/s, where one holds beside the road's own.
     #[must_use]
     pub fn limit_m_s(&self, time_s: f64) -> Option<f64> {

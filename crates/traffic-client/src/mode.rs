@@ -149,13 +149,14 @@ pub struct Hashed<S> {
     hash: Fnv,
     manifest: Manifest,
     expected: Option<Manifest>,
+    stopped: bool,
 }
 
 impl<S> Hashed<S> {
     /// Fingerprints; `manifest` holds engine, seed and inputs.
     pub fn record(inner: S, manifest: Manifest) -> Self {
         let manifest = Manifest { schema: 1, ticks: 0, hashes: Vec::new(), ..manifest };
-        Self { inner, hash: Fnv::default(), manifest, expected: None }
+        Self { inner, hash: Fnv::default(), manifest, expected: None, stopped: false }
     }
 
     /// Fingerprints and compares with an earlier run.
@@ -165,6 +166,11 @@ impl<S> Hashed<S> {
     pub fn verify(inner: S, manifest: Manifest, expected: Manifest) -> Result<Self, TrafficError> {
         expected.check_inputs(&manifest)?;
         Ok(Self { expected: Some(expected), ..Self::record(inner, manifest) })
+    }
+
+    /// Takes no more fingerprints, unless they are compared.
+    pub fn stop(&mut self) {
+        self.stopped = self.expected.is_none();
     }
 
     /// The manifest so far.
@@ -190,6 +196,9 @@ impl<S: TrafficSource<Error = TrafficError>> TrafficSource for Hashed<S> {
 
     fn advance(&mut self, now: Time, ego: &EgoState) -> Result<&Scene, TrafficError> {
         let scene = self.inner.advance(now, ego)?;
+        if self.stopped {
+            return Ok(scene);
+        }
         self.hash.add(scene.time.0 as u64);
         for n in &scene.neighbours {
             self.hash.add(n.id);

@@ -173,16 +173,31 @@ impl TruckModel {
         patch: &RoadPatch,
         duration_s: f64,
     ) -> Result<TruckState, DynamicsError> {
+        let mut s = *state;
+        self.advance(&mut s, command, patch, duration_s)?;
+        Ok(s)
+    }
+
+    /// As [`Self::step`], in place: after an error the state is what is not finite, or what it was.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
+    pub fn advance(
+        &self,
+        s: &mut TruckState,
+        command: &Command,
+        patch: &RoadPatch,
+        duration_s: f64,
+    ) -> Result<(), DynamicsError> {
         command.check_finite().map_err(|e| match e {
             tractrix_core::CoreError::NonFinite { field, value } => {
                 DynamicsError::NonFinite { effect: "command", quantity: field, value }
             }
             _ => DynamicsError::NonFinite { effect: "command", quantity: "?", value: f64::NAN },
         })?;
-        let mut s = *state;
         let patch = &self.true_patch(patch);
         for _ in 0..libm::round(duration_s / SUBSTEP_S).max(0.0) as u32 {
-            self.substep(&mut s, command, patch);
+            self.substep(s, command, patch);
         }
         check("longitudinal", "speed_m_s", s.speed_m_s)?;
         check("engine", "engine_speed_rad_s", s.engine_speed_rad_s)?;
@@ -191,8 +206,7 @@ impl TruckModel {
         check("lateral", "articulation_rad", s.lateral.articulation_rad)?;
         check("lateral", "x_m", s.lateral.x_m)?;
         check("lateral", "y_m", s.lateral.y_m)?;
-        check("brake", "temperature_k", s.brake.temperature_k[1])?;
-        Ok(s)
+        check("brake", "temperature_k", s.brake.temperature_k[1])
     }
 
     fn substep(&self, s: &mut TruckState, command: &Command, patch: &RoadPatch) {

@@ -36,16 +36,31 @@ impl SpeedBounds {
     fn even_m_s(&self, road: &Road, lane: u16, from_m: f64, to_m: f64) -> Option<f64> {
         let [from_m, to_m] = [from_m, to_m].map(|s_m| s_m.clamp(0.0, road.length_m()));
         let limit_m_s = road.even_lane_speed_limit_m_s(lane, from_m, to_m)?;
-        let curved_1_m = road.line().curved_at_most_1_m(from_m, to_m).max(1e-6);
-        let holds =
-            self.obey_speed_limits && self.curve_accel_m_s2 / curved_1_m >= limit_m_s * limit_m_s;
+        let line = road.line();
+        let allows =
+            |curved_1_m: f64| self.curve_accel_m_s2 / curved_1_m.max(1e-6) >= limit_m_s * limit_m_s;
+        let holds = self.obey_speed_limits
+            && (allows(line.curved_anywhere_at_most_1_m())
+                || allows(line.curved_at_most_1_m(from_m, to_m)));
         holds.then_some(limit_m_s)
     }
+}
+
+/// One speed all the way.
+#[derive(Debug, Clone, Copy)]
+struct Even {
+    /// Station of the first point, m.
+    s_m: f64,
+    speed_m_s: f64,
+    /// What limits and curves allow, m/s.
+    held_m_s: f64,
 }
 
 /// Speed reference from a station on.
 #[derive(Debug)]
 pub(crate) struct ReferenceSpeed {
+    /// In place of the points, which nobody asks for in most ticks.
+    even: Option<Even>,
     points: Vec<SpeedPoint>,
     /// What limits, curves and the lane's end allow at the points, m/s.
     held_m_s: [f64; POINTS],
@@ -53,18 +68,24 @@ pub(crate) struct ReferenceSpeed {
 
 impl Default for ReferenceSpeed {
     fn default() -> Self {
-        Self { points: Vec::new(), held_m_s: [0.0; POINTS] }
+        Self { even: None, points: Vec::with_capacity(POINTS), held_m_s: [0.0; POINTS] }
     }
 }
 
+/// A copy has the room too; `clone_from` copies into it.
 impl Clone for ReferenceSpeed {
     fn clone(&self) -> Self {
-        Self { points: self.points.clone(), held_m_s: self.held_m_s }
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
     }
 
     fn clone_from(&mut self, from: &Self) {
-        self.points.clone_from(&from.points);
-        self.held_m_s = from.held_m_s;
+        self.even = from.even;
+        if from.even.is_none() {
+            self.points.clone_from(&from.points);
+            self.held_m_s = from.held_m_s;
+        }
     }
 }
 
@@ -103,10 +124,12 @@ impl ReferenceSpeed {
         if let Some(limit_m_s) = bounds.even_m_s(road, lane, first_m, last_m + STEP_M)
             && last_m < lane_end_m
         {
-            self.held_m_s = [limit_m_s; POINTS];
             if planned.is_none() {
-                return self.hold(s_m, bounds.set_speed_m_s.min(limit_m_s));
+                let speed_m_s = bounds.set_speed_m_s.min(limit_m_s);
+                self.even = Some(Even { s_m, speed_m_s, held_m_s: limit_m_s });
+                return;
             }
+            self.held_m_s = [limit_m_s; POINTS];
         } else {
             let mut caps_m_s = [f64::INFINITY; POINTS + LONGEST];
             for (k, cap_m_s) in caps_m_s.iter_mut().enumerate().take(POINTS + behind) {
@@ -120,25 +143,17 @@ impl ReferenceSpeed {
         self.rise(s_m, |s| planned.and_then(|p| p(s)).unwrap_or(bounds.set_speed_m_s));
     }
 
-    /// One speed all the way.
-    fn hold(&mut self, s_m: f64, speed_m_s: f64) {
-        self.points.clear();
-        self.points.extend((0..POINTS).map(|i| {
-            let s_m = s_m + i as f64 * STEP_M;
-            SpeedPoint { s_m, speed_m_s, accel_m_s2: 0.0 }
-        }));
-    }
-
     /// Recomputes the reference from what limits, curves and the lane's end allow another one, with
     /// another set speed.
     pub(crate) fn update_like(&mut self, other: &Self, set_speed_m_s: f64) {
-        let Some(first) = other.points.first() else { return };
-        self.held_m_s = other.held_m_s;
+        let Some(first) = other.points().next() else { return };
+        self.held_m_s = other.even.map_or(other.held_m_s, |even| [even.held_m_s; POINTS]);
         self.rise(first.s_m, |_| set_speed_m_s);
     }
 
     /// As fast as is wanted and allowed, with a comfortable deceleration towards what is lower.
     fn rise(&mut self, s_m: f64, wanted_m_s: impl Fn(f64) -> f64) {
+        self.even = None;
         self.points.clear();
         self.points.extend(self.held_m_s.iter().enumerate().map(|(i, held)| {
             let s_m = s_m + i as f64 * STEP_M;
@@ -162,6 +177,9 @@ impl ReferenceSpeed {
     /// 0.3 m/s². `None` before the first update.
     #[must_use]
     pub(crate) fn at(&self, s_m: f64) -> Option<(f64, f64)> {
+        if let Some(even) = self.even {
+            return Some((even.speed_m_s, 0.0));
+        }
         let first = self.points.first()?;
         let x = ((s_m - first.s_m) / STEP_M).clamp(0.0, (self.points.len() - 1) as f64);
         let i = (x as usize).min(self.points.len() - 2);
@@ -173,10 +191,22 @@ impl ReferenceSpeed {
         Some((libm::sqrt(v2.max(0.0)), p.accel_m_s2.clamp(-2.0 * APPROACH_DECEL_M_S2, 0.3)))
     }
 
-    /// The points.
+    /// Whether there was no update yet.
     #[must_use]
-    pub(crate) fn points(&self) -> &[SpeedPoint] {
-        &self.points
+    pub(crate) fn is_empty(&self) -> bool {
+        self.even.is_none() && self.points.is_empty()
+    }
+
+    /// The points.
+    pub(crate) fn points(&self) -> impl Iterator<Item = SpeedPoint> {
+        let one_speed = |even: Even| {
+            (0..POINTS).map(move |i| {
+                let s_m = even.s_m + i as f64 * STEP_M;
+                SpeedPoint { s_m, speed_m_s: even.speed_m_s, accel_m_s2: 0.0 }
+            })
+        };
+        let kept = if self.even.is_some() { &[][..] } else { &self.points };
+        self.even.into_iter().flat_map(one_speed).chain(kept.iter().copied())
     }
 }
 
@@ -278,8 +308,11 @@ mod tests {
                     let reached = (ahead * ahead + 2.0 * APPROACH_DECEL_M_S2 * STEP_M).sqrt();
                     by_points[i] = by_points[i].min(reached);
                 }
-                for (point, speed_m_s) in reference.points().iter().zip(by_points) {
+                assert_eq!(reference.points().count(), POINTS);
+                for (point, speed_m_s) in reference.points().zip(by_points) {
                     assert_eq!(point.speed_m_s.to_bits(), speed_m_s.to_bits(), "at {s_m} m");
+                    let (there_m_s, _) = reference.at(point.s_m).unwrap();
+                    assert!((there_m_s - speed_m_s).abs() < 1e-9, "at {s_m} m");
                 }
             }
         }

@@ -106,14 +106,24 @@ impl Control {
     fn steer(&mut self, at: &Situation<'_>, path: &LateralPath) -> (PathError, f64) {
         let Situation { ego, road, limits, .. } = *at;
         let here = path.at(road, ego.s_m);
-        let (angle, _) = path.direction(road, ego.s_m);
-        let heading = road.line().at(ego.s_m).heading_rad + angle;
+        let (angle, here_1_m) = here.direction(road.line().curvature_1_m(ego.s_m).1);
+        let heading = road.line().heading_rad(ego.s_m) + angle;
         let error =
             PathError { offset_m: ego.d_m - here.d_m, heading_rad: wrapped(ego.yaw_rad - heading) };
         let step_m = ego.speed_m_s.max(LOWEST_SPEED_M_S) * PREVIEW_STEP_S;
-        let mut curvature = [0.0; PREVIEW_POINTS];
-        for (i, k) in curvature.iter_mut().enumerate() {
-            *k = path.curvature_1_m(road, ego.s_m + i as f64 * step_m);
+        let mut curvature = [here_1_m; PREVIEW_POINTS];
+        // a step farther, so that no rounding of stations leaves it
+        let seen_m = ego.s_m + PREVIEW_POINTS as f64 * step_m;
+        let is_straight = path.offset.is_none()
+            && road
+                .lanes()
+                .get(usize::from(path.lane))
+                .is_some_and(|l| l.center.as_constant().is_some())
+            && road.line().curved_at_most_1_m(ego.s_m, seen_m) == 0.0;
+        if !is_straight {
+            for (i, k) in curvature.iter_mut().enumerate().skip(1) {
+                *k = path.curvature_1_m(road, ego.s_m + i as f64 * step_m);
+            }
         }
         (error, self.lateral.step(ego, error, &curvature, limits))
     }

@@ -27,6 +27,7 @@ pub use config::{RatesConfig, SpeedPlannerKind, StackConfig};
 pub use outside::OutsideDemand;
 pub use tactics::{TacticalPlan, Tactics};
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 
@@ -60,7 +61,7 @@ pub struct Stack {
     believed: EgoState,
     estimator: LoadEstimator,
     /// The truck's limits with the estimated load, once there is a valid estimate.
-    estimated: Option<VehicleLimits>,
+    estimated: Option<Box<VehicleLimits>>,
     /// Who drives from outside has asked for this.
     demand: Option<OutsideDemand>,
     plan: Plan,
@@ -233,7 +234,7 @@ impl Stack {
         let planned = if inspection.ego_usable && !inspection.driver {
             self.estimate_load(dt_s, &ego, road, limits);
             let estimated = self.estimated.take();
-            let known = estimated.as_ref().unwrap_or(limits);
+            let known = estimated.as_deref().unwrap_or(limits);
             let at = Situation { now, ego: &ego, scene, road, limits: known };
             let planned = match demand {
                 Some(demand) => Some(self.obey(&demand, &at)),
@@ -299,7 +300,7 @@ impl Stack {
         let planned_kg =
             self.estimated.as_ref().map_or(limits.road_load.mass_kg, |l| l.road_load.mass_kg);
         if estimate.valid && (estimate.mass_kg / planned_kg - 1.0).abs() > 0.01 {
-            let known = self.estimated.get_or_insert_with(|| limits.clone());
+            let known = self.estimated.get_or_insert_with(|| Box::new(limits.clone()));
             known.road_load.mass_kg = estimate.mass_kg;
             known.road_load.rolling_coeff = estimate.rolling_coeff;
         }
@@ -318,7 +319,7 @@ impl Stack {
         plan.speed_status = self.tactics.speed_status;
         if tactical.new_speed {
             plan.speed.clear();
-            plan.speed.extend_from_slice(self.tactics.speed_points());
+            plan.speed.extend(self.tactics.speed_points());
         }
         if tactical.new_path {
             publish_path(&mut plan.path, &tactical.path, at.road, at.ego);

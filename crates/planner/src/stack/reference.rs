@@ -29,7 +29,7 @@ impl Tactics {
     }
 
     /// The reference ahead.
-    pub(super) fn speed_points(&self) -> &[SpeedPoint] {
+    pub(super) fn speed_points(&self) -> impl Iterator<Item = SpeedPoint> {
         self.reference.points()
     }
 

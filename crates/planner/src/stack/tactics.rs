@@ -1,6 +1,7 @@
 //! What to drive: lane and speed, from the situation alone. How it is driven, and the last check,
 //! are the stack's; a point that follows [`TacticalPlan`] needs neither.
 
+use alloc::boxed::Box;
 use alloc::sync::Arc;
 
 use super::speed::SpeedPlanning;
@@ -56,7 +57,8 @@ pub struct TacticalPlan {
 #[derive(Debug)]
 pub struct Tactics {
     pub(super) config: StackConfig,
-    pub(super) maneuver: Option<ManeuverPlanner>,
+    /// In a box, as each tick takes it out and puts it back.
+    pub(super) maneuver: Option<Box<ManeuverPlanner>>,
     pub(super) reference: ReferenceSpeed,
     /// What the driver, limits and curves allow: up to there cruise control rolls before it brakes,
     /// and so fast a planned truck would be without others.
@@ -228,13 +230,13 @@ impl Tactics {
         let maneuver = match self.maneuver.take() {
             Some(maneuver) => maneuver,
             None => match self.joining(at) {
-                Some(maneuver) => maneuver,
+                Some(maneuver) => Box::new(maneuver),
                 None => return false,
             },
         };
         let due = self.ticks.is_multiple_of(u64::from(self.config.rates.path_ticks));
         let known = self.foreseen == Some(self.ticks);
-        if !known && (due || self.reference.points().is_empty()) {
+        if !known && (due || self.reference.is_empty()) {
             self.plan_speed(at, &maneuver);
             self.update_reference(at, maneuver.path().lane);
             self.foreseen = Some(self.ticks);
@@ -387,7 +389,7 @@ fn start_lane(road: &Road, ego: &EgoState) -> Option<u16> {
 
 /// From where the truck is to the lane's centre, within [`JOIN_S`].
 fn join_from(road: &Road, lane: u16, ego: &EgoState) -> LateralPath {
-    let heading = wrapped(ego.yaw_rad - road.line().at(ego.s_m).heading_rad);
+    let heading = wrapped(ego.yaw_rad - road.line().heading_rad(ego.s_m));
     let here =
         Lateral { d_m: ego.d_m, slope: libm::tan(heading.clamp(-0.5, 0.5)), second_1_m: 0.0 };
     let length_m = JOIN_S * ego.speed_m_s.max(5.0);

@@ -6,7 +6,7 @@
 //! `RA |v² k - g bank| / a_rollover` below its bound (`RA`: rearward amplification), and the corners
 //! of tractor and trailer inside the two lanes. The trailer follows by the paper's Eq. 1.
 
-use super::path::{Lateral, LateralPath, Quintic, direction, lane_centre, off_centre};
+use super::path::{Lateral, LateralPath, Quintic, lane_centre, off_centre};
 use crate::error::config_in;
 use crate::safety::{Gate, SpeedCourse, Strictness};
 use crate::{LaneChoice, PlannerError};
@@ -382,7 +382,8 @@ fn drivable(
     while time_s <= course.duration_s + 1.0 {
         let (v, travelled) = course.at(time_s);
         let s_m = start.ego.s_m + travelled;
-        let at = start.road.line().at(s_m);
+        let line = start.road.line();
+        let (here_m, road_curvature_1_m) = line.curvature_1_m(s_m);
         let centre = lane_centre(start.road, path.lane, s_m);
         let (q, jerk) = path.offset.map_or((Lateral::default(), 0.0), |offset| {
             (offset.at(s_m), v * v * v * offset.third_1_m2(s_m))
@@ -392,8 +393,8 @@ fn drivable(
             slope: centre.slope + q.slope,
             second_1_m: q.second_1_m,
         };
-        let (angle, curvature) = direction(&lateral, at.curvature_1_m);
-        let felt = v * v * curvature - GRAVITY_M_S2 * at.bank_rad;
+        let (angle, curvature) = lateral.direction(road_curvature_1_m);
+        let felt = v * v * curvature - GRAVITY_M_S2 * line.bank().at(here_m);
         let transfer = REARWARD_AMPLIFICATION * felt.abs() / l.rollover_accel_m_s2;
         if (v * v * q.second_1_m).abs() > accel_max
             || jerk.abs() > jerk_max
@@ -405,12 +406,13 @@ fn drivable(
         let (low, high) = corridor.edges_m(s_m);
         let (low, high) = (low + config.edge_margin_m, high - config.edge_margin_m);
         let half = 0.5 * g.width_m;
-        let across = |ahead_m: f64, angle: f64, from_m: f64| {
-            from_m + ahead_m * libm::sin(angle) - 0.5 * at.curvature_1_m * ahead_m * ahead_m
+        let across = |ahead_m: f64, sin: f64, from_m: f64| {
+            from_m + ahead_m * sin - 0.5 * road_curvature_1_m * ahead_m * ahead_m
         };
-        let front = across(g.front_m, angle, lateral.d_m);
-        let hitch = lateral.d_m + g.hitch_ahead_m * libm::sin(angle);
-        let rear = across(-g.trailer_rear_m, angle - bend, hitch);
+        let sin = libm::sin(angle);
+        let front = across(g.front_m, sin, lateral.d_m);
+        let hitch = lateral.d_m + g.hitch_ahead_m * sin;
+        let rear = across(-g.trailer_rear_m, libm::sin(angle - bend), hitch);
         for d_m in [front, rear] {
             if d_m - half < low || d_m + half > high {
                 return false;

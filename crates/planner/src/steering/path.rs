@@ -24,6 +24,16 @@ pub struct Lateral {
     pub second_1_m: f64,
 }
 
+impl Lateral {
+    /// Heading relative to the road, rad, and map curvature, 1/m, where the road has this curvature,
+    /// 1/m.
+    #[must_use]
+    pub fn direction(&self, road_curvature_1_m: f64) -> (f64, f64) {
+        let (tan, curvature_1_m) = bend(self, road_curvature_1_m);
+        (libm::atan(tan), curvature_1_m)
+    }
+}
+
 /// Fifth-order polynomial from a state to zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Quintic {
@@ -155,7 +165,7 @@ impl LateralPath {
     /// Heading relative to the road and map curvature at a station: (rad, 1/m).
     #[must_use]
     pub fn direction(&self, road: &Road, s_m: f64) -> (f64, f64) {
-        direction(&self.at(road, s_m), road.line().curvature_1_m(s_m).1)
+        self.at(road, s_m).direction(road.line().curvature_1_m(s_m).1)
     }
 
     /// Map curvature alone at a station, 1/m: that of [`Self::direction`].
@@ -169,7 +179,7 @@ impl LateralPath {
     pub fn point(&self, road: &Road, s_m: f64, time_s: f64) -> PathPoint {
         let lateral = self.at(road, s_m);
         let at = road.at(s_m, lateral.d_m);
-        let (angle, curvature_1_m) = direction(&lateral, at.curvature_1_m);
+        let (angle, curvature_1_m) = lateral.direction(at.curvature_1_m);
         PathPoint {
             time_s,
             s_m,
@@ -180,13 +190,6 @@ impl LateralPath {
             curvature_1_m,
         }
     }
-}
-
-/// Heading relative to the road, rad, and map curvature, 1/m, of a lateral course.
-#[must_use]
-pub(super) fn direction(lateral: &Lateral, road_curvature_1_m: f64) -> (f64, f64) {
-    let (tan, curvature_1_m) = bend(lateral, road_curvature_1_m);
-    (libm::atan(tan), curvature_1_m)
 }
 
 /// Tangent of the heading relative to the road, and map curvature, 1/m.

@@ -8,7 +8,9 @@ use planner::decider::{DeciderKind, LaneChoice};
 use planner::safety::RssConfig;
 use planner::{RatesConfig, Situation, StackConfig, Tactics};
 use road::Road;
-use tractrix_core::{Geometry, LaneChangeRefusal, Maneuver, Recorder, Tick, Vehicle};
+use tractrix_core::{
+    Geometry, LaneChangeRefusal, Maneuver, Recorder, Tick, Vehicle, VehicleLimits,
+};
 use traffic_client::Mode;
 use traffic_client::native::{NativeSnapshot, NativeTraffic};
 
@@ -176,7 +178,9 @@ impl Shared {
     /// The kinematic ego and the traffic that it begins in.
     fn warm(&self) -> Result<(Kinematic, Vec<NativeSnapshot>), SimError> {
         let scenario = &self.spec.scenario;
-        let truck = self.truck(0.0)?;
+        let weather = &scenario.weather;
+        let (model, road) = (Arc::clone(&self.model), Arc::clone(&self.road));
+        let truck = SimTruck::new(model, road, &scenario.ego, weather)?;
         let limits = Arc::new(truck.limits().clone());
         let config =
             StackConfig { rates: RatesConfig::for_tick(SUBSTEP_S), ..scenario.stack.clone() };
@@ -184,7 +188,7 @@ impl Shared {
         let with = |seed: u64| scenario.traffic.demand(seed);
         let geometry = limits.geometry;
         let mut traffic = NativeTraffic::new(Arc::clone(&self.road), geometry, with(0))?;
-        traffic.set_map_poses(false);
+        traffic.set_map_poses_within_m(-1.0);
         let mut pool = vec![traffic.snapshot()];
         for seed in 1..POOL {
             let road = Arc::clone(&self.road);
@@ -194,11 +198,12 @@ impl Shared {
         Ok((Kinematic::new(Arc::clone(&self.road), limits, traffic, tactics), pool))
     }
 
-    /// The truck so far behind the scenario's start, m.
-    fn truck(&self, further_m: f64) -> Result<SimTruck, SimError> {
+    /// The truck, with these limits, so far behind the scenario's start, m.
+    fn truck(&self, further_m: f64, limits: &VehicleLimits) -> Result<SimTruck, SimError> {
         let scenario = &self.spec.scenario;
         let start = EgoStart { s_m: scenario.ego.s_m + further_m, ..scenario.ego.clone() };
-        SimTruck::new(Arc::clone(&self.model), Arc::clone(&self.road), &start, &scenario.weather)
+        let (model, road) = (Arc::clone(&self.model), Arc::clone(&self.road));
+        SimTruck::with_limits(model, road, &start, &scenario.weather, limits.clone())
     }
 
     /// A body at the start of the episode with this seed, in the arrays of an earlier one.
@@ -210,7 +215,8 @@ impl Shared {
             scenario.ego.s_m += further_m;
             let (road, truck) = (Arc::clone(&self.road), Arc::clone(&self.model));
             let start_s_m = scenario.ego.s_m;
-            let world = World::assemble(&scenario, seed, road, truck)?;
+            let mut world = World::assemble(&scenario, seed, road, truck)?;
+            world.only_collisions();
             return Ok((Body::Truck(Box::new(world)), start_s_m));
         };
         let mut kinematic = match former {
@@ -223,7 +229,7 @@ impl Shared {
         }
         kinematic.traffic.reseed(seed);
         kinematic.traffic.make_room();
-        let ego = *self.truck(further_m)?.state();
+        let ego = *self.truck(further_m, &model.limits)?.state();
         kinematic.begin(ego)?;
         Ok((Body::Kinematic(kinematic), ego.s_m))
     }

@@ -114,8 +114,8 @@ impl Kinematic {
         let speed_m_s = (before_m_s + accel_m_s2 * SUBSTEP_S).max(0.0);
         let s_m = self.ego.s_m + 0.5 * (before_m_s + speed_m_s) * SUBSTEP_S;
         let lateral = plan.path.at(&self.road, s_m);
-        let (angle_rad, curvature_1_m) = plan.path.direction(&self.road, s_m);
         let at = self.road.at(s_m, lateral.d_m);
+        let (angle_rad, curvature_1_m) = lateral.direction(at.curvature_1_m);
         self.grade_rad = at.grade_rad;
         let e = &mut self.ego;
         (e.x_m, e.y_m, e.z_m) = (at.x_m, at.y_m, at.z_m);

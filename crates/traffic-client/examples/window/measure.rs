@@ -71,7 +71,7 @@ pub(crate) fn run(
     let geometry = Geometry { trailer_rear_m: 11.5, width_m: 2.55, ..geometry };
     let road = &family.road;
     let mut traffic = NativeTraffic::new(Arc::clone(road), geometry, config).unwrap();
-    traffic.set_map_poses(false);
+    traffic.set_map_poses_within_m(-1.0);
     let lane = road.lanes().iter().find(|lane| lane.s_start_m <= family.s_m).unwrap();
     let through = road.lanes().len() as f64;
     let idm = Idm::new(WANTED_M_S, 1.5, 3.0, 0.5, 1.5, 6.0);

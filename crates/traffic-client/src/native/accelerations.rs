@@ -13,6 +13,16 @@ const END_MARGIN_M: f64 = 2.0;
 /// Drivers adapt to the speed beyond the end of the road over this stretch before it, m.
 pub(crate) const BEYOND_M: f64 = 60.0;
 
+/// What a driver wants in a tick, before its lane changes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Wanted {
+    /// Acceleration, m/s².
+    pub(super) accel_m_s2: f64,
+    /// The same with nobody ahead in the lane that is driven or come into, m/s²; `None` of who does
+    /// not act.
+    pub(super) free_m_s2: Option<f64>,
+}
+
 impl Engine {
     /// The wanted acceleration as far as engine and tyres give it, m/s².
     pub(super) fn possible_m_s2(&self, i: usize) -> f64 {
@@ -24,7 +34,7 @@ impl Engine {
             class.rolling_coeff,
             class.drag_1_m,
         );
-        self.raw_a_m_s2[i].min(power).max(-driver.idm.max_decel_m_s2)
+        self.wanted[i].accel_m_s2.min(power).max(-driver.idm.max_decel_m_s2)
     }
 
     pub(super) fn class(&self, i: usize) -> &ClassConfig {
@@ -55,6 +65,20 @@ impl Engine {
         let b = driver.idm.decel_m_s2;
         let needed = (v * v - lower_m_s * lower_m_s) / (2.0 * (lower_at_m - s_m).max(1.0));
         if needed < OFF_THE_PEDAL * b { free } else { free.min(-needed * needed / b) }
+    }
+
+    /// [`Self::free_m_s2`] once all have said what they want: from there where it is that.
+    pub(super) fn known_free_m_s2(&self, i: usize, lane: u16) -> f64 {
+        let known = self.wanted[i].free_m_s2;
+        let is_one_rule = self.map.has_one_limit() && self.beyond_m_s.is_empty();
+        let known = known.filter(|_| is_one_rule || lane == self.driven(i));
+        known.unwrap_or_else(|| self.free_m_s2(i, lane))
+    }
+
+    /// The lane that vehicle `i` drives in, or comes into.
+    fn driven(&self, i: usize) -> u16 {
+        let fleet = &self.state.fleet;
+        if fleet.is_changing(i) { fleet.target[i] } else { fleet.lane[i] }
     }
 
     /// What the leader in `lane` takes away, m/s², for the headway that the driver keeps now.
@@ -99,13 +123,11 @@ impl Engine {
     }
 
     /// Car following in the lane, or in both lanes during a change, and the end of the lane.
-    pub(super) fn follow_m_s2(&self, i: usize) -> f64 {
+    pub(super) fn follow_m_s2(&self, i: usize) -> Wanted {
         let fleet = &self.state.fleet;
-        let lane = fleet.lane[i];
+        let (lane, driven) = (fleet.lane[i], self.driven(i));
         let mut a = self.behind_m_s2(i, self.near.leader[i][OWN], lane);
-        let mut driven = lane;
         if fleet.is_changing(i) {
-            driven = fleet.target[i];
             let side = self.side_of(i, driven);
             a = a.min(self.behind_m_s2(i, self.near.leader[i][side], driven));
         }
@@ -117,7 +139,9 @@ impl Engine {
         if !self.blocks.is_empty() {
             a = a.min(self.closure_m_s2(i, driven, END_MARGIN_M)).min(self.stop_m_s2(i));
         }
-        fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, driven), a)
+        let free_m_s2 = self.free_m_s2(i, driven);
+        let accel_m_s2 = fleet.driver[i].idm.lesser_m_s2(free_m_s2, a);
+        Wanted { accel_m_s2, free_m_s2: Some(free_m_s2) }
     }
 
     fn side_of(&self, i: usize, lane: u16) -> usize {

@@ -44,32 +44,43 @@ impl Engine {
         let (map, fleet) = (&*self.map, &mut self.state.fleet);
         let step_s = Stride::FAR.step_s;
         let mut moved = Moved::default();
-        for i in asleep.rev() {
-            let (s_m, v_m_s, driver) = (fleet.s_m[i], fleet.v_m_s[i], &fleet.driver[i]);
-            let mut to_m = s_m + v_m_s * step_s;
-            let lanes = [fleet.lane[i], fleet.target[i]].map(usize::from);
-            for lane in lanes {
-                if let Some(&Some((rear_m, leader_m_s))) = last.get(lane) {
-                    let gap_m = driver.idm.min_gap_m + driver.idm.headway_s * leader_m_s;
-                    to_m = to_m.min(rear_m - gap_m);
-                }
+        let r = asleep;
+        let motion = fleet.s_m[r.clone()].iter_mut().zip(&fleet.v_m_s[r.clone()]);
+        let change = fleet.lane[r.clone()].iter_mut().zip(&mut fleet.target[r.clone()]);
+        let inside = fleet.a_m_s2[r.clone()].iter_mut().zip(&mut fleet.clock_s[r.clone()]);
+        let each = motion.zip(change).zip(inside.zip(&fleet.driver[r]));
+        for (((s_m, &v_m_s), (lane, target)), ((a_m_s2, clock_s), driver)) in each.rev() {
+            let is_changing = *target != NO_LANE;
+            let free_m = *s_m + v_m_s * step_s;
+            let behind_last = |to_m: f64, last: &[Last; LANES], lane: u16| {
+                let Some(&Some((rear_m, leader_m_s))) = last.get(usize::from(lane)) else {
+                    return to_m;
+                };
+                let gap_m = driver.idm.min_gap_m + driver.idm.headway_s * leader_m_s;
+                if rear_m - gap_m < to_m { rear_m - gap_m } else { to_m }
+            };
+            let mut to_m = behind_last(free_m, last, *lane);
+            if is_changing {
+                to_m = behind_last(to_m, last, *target);
             }
-            let to_m = to_m.max(s_m);
-            moved.driven_m += to_m - s_m;
-            for lane in lanes {
-                if let Some(last) = last.get_mut(lane) {
-                    *last = Some((to_m - driver.length_m, v_m_s));
-                }
+            let to_m = if to_m > *s_m { to_m } else { *s_m };
+            moved.driven_m += to_m - *s_m;
+            let own = Some((to_m - driver.length_m, v_m_s));
+            if let Some(last) = last.get_mut(usize::from(*lane)) {
+                *last = own;
             }
-            (fleet.s_m[i], fleet.a_m_s2[i]) = (to_m, 0.0);
-            fleet.clock_s[i] += step_s;
-            if fleet.target[i] == NO_LANE {
-                fleet.clock_s[i] = fleet.clock_s[i].min(0.0);
-            } else if fleet.clock_s[i] >= driver.lane_change_s {
-                fleet.lane[i] = fleet.target[i];
-                (fleet.target[i], fleet.clock_s[i]) = (NO_LANE, 0.0);
+            if let Some(last) = last.get_mut(usize::from(*target)) {
+                *last = own;
             }
-            moved.somebody_leaves |= is_out(map, to_m, fleet.lane[i], &fleet.driver[i]);
+            (*s_m, *a_m_s2) = (to_m, 0.0);
+            *clock_s += step_s;
+            if !is_changing {
+                *clock_s = clock_s.min(0.0);
+            } else if *clock_s >= driver.lane_change_s {
+                *lane = *target;
+                (*target, *clock_s) = (NO_LANE, 0.0);
+            }
+            moved.somebody_leaves |= is_out(map, to_m, *lane, driver);
         }
         moved
     }

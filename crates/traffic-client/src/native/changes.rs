@@ -60,11 +60,20 @@ pub(super) struct Wish {
 impl Engine {
     /// The lane change that vehicle `i` has to make, if any.
     fn need(&self, i: usize) -> Option<Need> {
+        if self.map.has_needs() || self.is_eventful() { self.need_here(i) } else { None }
+    }
+
+    fn need_here(&self, i: usize) -> Option<Need> {
         let fleet = &self.state.fleet;
-        if let Some((side, distance_m)) = self.happening_need(i) {
+        if self.is_eventful()
+            && let Some((side, distance_m)) = self.happening_need(i)
+        {
             return Some(Need { side, distance_m });
         }
         let (lane, s, exit) = (fleet.lane[i], fleet.s_m[i], fleet.driver[i].exit);
+        if exit == NO_LANE && !self.map.ends_early(lane) {
+            return None;
+        }
         let here = &self.map.lanes[lane as usize];
         let ahead = self.ahead_m(fleet.driver[i].class);
         if exit != NO_LANE && lane != exit {
@@ -283,7 +292,7 @@ impl Engine {
         if lane == NO_LANE || !self.map.is_open_to(lane, fleet.driver[i].exit) {
             return None;
         }
-        if self.keeps_out(i, lane) || self.is_kept_for_ego(lane, s) {
+        if self.is_eventful() && self.keeps_out(i, lane) || self.is_kept_for_ego(lane, s) {
             return None;
         }
         if desire.is_none() && self.is_closed_to(lane, fleet.driver[i].class) {
@@ -313,33 +322,46 @@ impl Engine {
             right_bias_m_s2: class.right_bias_m_s2,
         };
         let pays = |c: &Change| desire.is_some() || mobil.incentive_m_s2(c, side == RIGHT) > 0.0;
+        // Most changes do not pay even if nobody is ahead there, nobody minds, and whoever is behind
+        // gains all there is to gain: what is less than that is worked out only where it may matter.
+        let free_m_s2 = self.known_free_m_s2(i, lane);
         let mut change = Change {
-            own_before_m_s2: self.raw_a_m_s2[i],
-            own_after_m_s2: self.in_lane_m_s2(i, leader, lane, frac(i)),
+            own_before_m_s2: self.wanted[i].accel_m_s2,
+            own_after_m_s2: free_m_s2,
             ..Change::default()
         };
-        // Most changes do not pay even if nobody minds and whoever is behind gains all there is to
-        // gain: what the others would do is worked out only where it may matter.
-        if let o @ ..EGO = self.near.follower[i][OWN] {
-            let (o, before) = (o as usize, self.raw_a_m_s2[o as usize]);
+        let old_follower = Some(self.near.follower[i][OWN]).filter(|&o| o < EGO);
+        if let Some(o) = old_follower {
+            let before = self.wanted[o as usize].accel_m_s2;
             change.old_follower_before_m_s2 = before;
-            change.old_follower_after_m_s2 = before.max(fleet.driver[o].idm.accel_m_s2);
-            if !pays(&change) {
-                return None;
-            }
-            let ahead = self.near.leader[i][OWN];
-            let after = self.in_lane_m_s2(o, ahead, fleet.lane[i], fleet.mind[o].headway_frac);
-            change.old_follower_after_m_s2 = after.max(before);
+            change.old_follower_after_m_s2 = before.max(fleet.driver[o as usize].idm.accel_m_s2);
         }
         if !pays(&change) {
             return None;
+        }
+        let taken = self.behind_at_m_s2(i, leader, lane, frac(i));
+        change.own_after_m_s2 = fleet.driver[i].idm.lesser_m_s2(free_m_s2, taken);
+        if !pays(&change) {
+            return None;
+        }
+        let known_in_lane = |i: usize, leader: u32, lane: u16, frac: f64| {
+            let taken = self.behind_at_m_s2(i, leader, lane, frac);
+            fleet.driver[i].idm.lesser_m_s2(self.known_free_m_s2(i, lane), taken)
+        };
+        if let Some(o) = old_follower {
+            let (o, ahead) = (o as usize, self.near.leader[i][OWN]);
+            let after = known_in_lane(o, ahead, fleet.lane[i], fleet.mind[o].headway_frac);
+            change.old_follower_after_m_s2 = after.max(change.old_follower_before_m_s2);
+            if !pays(&change) {
+                return None;
+            }
         }
         match follower {
             NOBODY => {}
             EGO => change.new_follower_after_m_s2 = self.ego_behind_m_s2(i, lane),
             f => {
-                let (f, before) = (f as usize, self.raw_a_m_s2[f as usize]);
-                let after = self.in_lane_m_s2(f, i as u32, lane, frac(f));
+                let (f, before) = (f as usize, self.wanted[f as usize].accel_m_s2);
+                let after = known_in_lane(f, i as u32, lane, frac(f));
                 change.new_follower_before_m_s2 = before;
                 change.new_follower_after_m_s2 = after.min(before);
             }

@@ -67,8 +67,8 @@ impl EgoSpans {
         road_heading_rad: f64,
         shift_m: f64,
     ) {
-        let heading = ego.yaw_rad - road_heading_rad;
-        self.speed_m_s = (ego.speed_m_s * libm::cos(heading)).max(0.0);
+        let heading = Turned::by(ego.yaw_rad - road_heading_rad);
+        self.speed_m_s = (ego.speed_m_s * heading.cos).max(0.0);
         self.spans.clear();
         let (s, d) = (ego.s_m + shift_m, ego.d_m);
         for body in bodies(s, d, heading, ego.trailer.articulation_rad, geometry) {
@@ -87,8 +87,8 @@ impl EgoSpans {
         }
         let middle = 0.5 * (rear + front);
         for (k, lane) in map.lanes.iter().enumerate() {
-            let half = 0.5 * lane.width_m(middle) - MARGIN_M;
-            let center = lane.center_d_m(middle);
+            let (center, width) = lane.center_and_width_m(middle);
+            let half = 0.5 * width - MARGIN_M;
             if lane.s_end_m < rear
                 || lane.s_start_m > front
                 || low > center + half
@@ -108,19 +108,32 @@ impl EgoSpans {
     }
 }
 
+/// An angle, rad, with its sine and cosine.
+#[derive(Debug, Clone, Copy)]
+struct Turned {
+    angle: f64,
+    sin: f64,
+    cos: f64,
+}
+
+impl Turned {
+    fn by(angle: f64) -> Self {
+        Self { angle, sin: libm::sin(angle), cos: libm::cos(angle) }
+    }
+}
+
 /// Tractor and trailer rectangles.
-fn bodies(s: f64, d: f64, heading: f64, articulation: f64, g: &Geometry) -> [Corners; 2] {
-    let rectangle = |s: f64, d: f64, angle: f64, ahead: f64, behind: f64| {
-        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+fn bodies(s: f64, d: f64, heading: Turned, articulation: f64, g: &Geometry) -> [Corners; 2] {
+    let rectangle = |s: f64, d: f64, Turned { sin, cos, .. }: Turned, ahead: f64, behind: f64| {
         let corner = |x: f64, y: f64| (s + x * cos - y * sin, d + x * sin + y * cos);
         let half = 0.5 * g.width_m;
         [corner(ahead, half), corner(ahead, -half), corner(-behind, -half), corner(-behind, half)]
     };
-    let (hitch_s, hitch_d) =
-        (s + g.hitch_ahead_m * libm::cos(heading), d + g.hitch_ahead_m * libm::sin(heading));
+    let (hitch_s, hitch_d) = (s + g.hitch_ahead_m * heading.cos, d + g.hitch_ahead_m * heading.sin);
+    let trailer = Turned::by(heading.angle + articulation);
     [
         rectangle(s, d, heading, g.front_m, g.tractor_rear_m),
-        rectangle(hitch_s, hitch_d, heading + articulation, g.trailer_front_m, g.trailer_rear_m),
+        rectangle(hitch_s, hitch_d, trailer, g.trailer_front_m, g.trailer_rear_m),
     ]
 }
 

@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use driver_models::{Idm, ballistic};
 
+use super::accelerations::Wanted;
 use super::boundary::Boundary;
 use super::changes::{DECISION_TICKS, EgoNeed, Wish, is_due};
 use super::config::TrafficConfig;
@@ -87,8 +88,8 @@ pub(crate) struct Engine {
     /// Station of the ego, m; `None` before the first scene.
     pub(crate) ego_s_m: Option<f64>,
     pub(crate) near: Neighbourhood,
-    /// Accelerations before this tick's lane changes, m/s².
-    pub(super) raw_a_m_s2: Vec<f64>,
+    /// What drivers want before this tick's lane changes.
+    pub(super) wanted: Vec<Wanted>,
     /// Accelerations that vehicles do not exceed, to make room, m/s², and wishes to change lanes:
     /// memory of a tick.
     bounds: Vec<(usize, f64)>,
@@ -132,7 +133,7 @@ impl Clone for Engine {
             ego,
             ego_s_m,
             near: _,
-            raw_a_m_s2: _,
+            wanted: _,
             bounds: _,
             wishes: _,
             begun_m: _,
@@ -205,7 +206,7 @@ impl Engine {
             ego: EgoSpans::default(),
             ego_s_m: None,
             near: Neighbourhood::default(),
-            raw_a_m_s2: Vec::new(),
+            wanted: Vec::new(),
             bounds: Vec::with_capacity(WISHES),
             wishes: Vec::with_capacity(WISHES),
             begun_m: Vec::new(),
@@ -236,36 +237,36 @@ impl Engine {
         let piece = self.piece;
         let acting = self.settle();
         self.find_neighbours(&*workers, piece, acting.clone());
-        let mut raw = std::mem::take(&mut self.raw_a_m_s2);
-        self.state.fleet.fit(&mut raw, 0.0);
+        let mut wanted = std::mem::take(&mut self.wanted);
+        self.state.fleet.fit(&mut wanted, Wanted::default());
         // Who does not act goes on as before.
         let looked_at = self.looked_at(&acting);
         for i in (looked_at.start..acting.start).chain(acting.end..looked_at.end) {
-            raw[i] = self.state.fleet.a_m_s2[i];
+            wanted[i] = Wanted { accel_m_s2: self.state.fleet.a_m_s2[i], free_m_s2: None };
         }
         let first = acting.start;
         let mut bounds = std::mem::take(&mut self.bounds);
-        let follow = |from: usize, raw: &mut [f64], bounds: &mut Vec<(usize, f64)>| {
-            for (i, a) in (from..).zip(raw) {
-                *a = self.follow_m_s2(i);
+        let follow = |from: usize, wanted: &mut [Wanted], bounds: &mut Vec<(usize, f64)>| {
+            for (i, wanted) in (from..).zip(wanted) {
+                *wanted = self.follow_m_s2(i);
                 self.make_room(i, bounds);
             }
         };
         if acting.len() <= piece {
-            follow(first, &mut raw[acting.clone()], &mut bounds);
+            follow(first, &mut wanted[acting.clone()], &mut bounds);
         } else {
-            let pieces = raw[acting.clone()].chunks_mut(piece);
-            let parts = in_pieces(&*workers, pieces, |k, raw| {
+            let pieces = wanted[acting.clone()].chunks_mut(piece);
+            let parts = in_pieces(&*workers, pieces, |k, wanted| {
                 let mut bounds = Vec::new();
-                follow(first + k * piece, raw, &mut bounds);
+                follow(first + k * piece, wanted, &mut bounds);
                 bounds
             });
             bounds.extend(parts.into_iter().flatten());
         }
         for (i, most_m_s2) in bounds.drain(..).chain(self.let_ego_in()) {
-            raw[i] = raw[i].min(most_m_s2);
+            wanted[i].accel_m_s2 = wanted[i].accel_m_s2.min(most_m_s2);
         }
-        self.raw_a_m_s2 = raw;
+        self.wanted = wanted;
         self.bounds = bounds;
         let mut a_m_s2 = std::mem::take(&mut self.state.fleet.a_m_s2);
         let mut wishes = std::mem::take(&mut self.wishes);
@@ -294,13 +295,12 @@ impl Engine {
     fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize, acting: Range<usize>) {
         let (fleet, map, tick) = (&self.state.fleet, &*self.map, self.state.tick);
         let (near, range) = (self.near(), self.looked_at(&acting));
-        let eventful = !self.blocks.is_empty() || !self.rushing.is_empty();
+        let (eventful, has_needs) = (self.is_eventful(), map.has_needs());
         let looks_aside = |i: usize| {
-            is_due(tick, fleet.id[i])
-                || !near.contains(&i)
+            !near.contains(&i)
+                || is_due(tick, fleet.id[i])
                 || fleet.is_changing(i)
-                || fleet.driver[i].exit != NO_LANE
-                || map.ends_early(fleet.lane[i])
+                || has_needs && (fleet.driver[i].exit != NO_LANE || map.ends_early(fleet.lane[i]))
                 || eventful
         };
         let seen = Seen { fleet, map, ego: &self.ego };
@@ -351,8 +351,13 @@ impl Engine {
         let go_on = |(((motion, change), inside), (fixed, a_m_s2)): Chunk<'_>| {
             let ((s_m, v_m_s), (lane, target), (clock_s, mind)) = (motion, change, inside);
             let (driver, id) = fixed;
+            // All are as long, which saves looking at it for each.
+            let n = s_m.len();
+            let (v_m_s, a_m_s2, clock_s) = (&mut v_m_s[..n], &a_m_s2[..n], &mut clock_s[..n]);
+            let (lane, target, mind) = (&mut lane[..n], &mut target[..n], &mut mind[..n]);
+            let (driver, id) = (&driver[..n], &id[..n]);
             let mut moved = Moved::default();
-            for i in 0..s_m.len() {
+            for i in 0..n {
                 let (v, distance_m) = ballistic(v_m_s[i], a_m_s2[i], stride.step_s);
                 v_m_s[i] = v;
                 s_m[i] += distance_m;
@@ -384,9 +389,9 @@ impl Engine {
         parts.into_iter().fold(Moved::default(), Moved::and)
     }
 
-    /// Memory of a vehicle, bytes: state, acceleration before lane changes, neighbours.
+    /// Memory of a vehicle, bytes: state, what its driver wants, neighbours.
     pub(crate) fn bytes_per_vehicle() -> usize {
-        Fleet::BYTES + size_of::<f64>() + 3 * size_of::<u16>() + 6 * size_of::<u32>()
+        Fleet::BYTES + size_of::<Wanted>() + 3 * size_of::<u16>() + 6 * size_of::<u32>()
     }
 
     /// Smallest bumper-to-bumper gap to a leader in any lane that a vehicle takes up, m; call it

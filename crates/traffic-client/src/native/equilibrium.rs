@@ -40,10 +40,15 @@ pub(crate) fn easy_speed_m_s(idm: &Idm, wish_m_s: f64, gap_m: f64, leader_m_s: f
 
 /// The gap that a driver keeps behind a leader of the same speed, m; [`FREE_M`] at most.
 pub(crate) fn kept_gap_m(idm: &Idm, v_m_s: f64, limit_m_s: f64) -> f64 {
+    // What [`follows_m_s2`] works out anew for each gap is the same for all of them.
+    let (wanted_m, free_m_s2) = (idm.wanted_gap_m(v_m_s, 0.0), idm.free_m_s2(v_m_s, limit_m_s));
+    if free_m_s2 < 0.0 {
+        return FREE_M;
+    }
     let (mut low, mut high) = (0.0, FREE_M);
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        if follows_m_s2(idm, v_m_s, limit_m_s, middle, 0.0) < 0.0 {
+        if idm.accel_m_s2 + idm.hindrance_m_s2(wanted_m, middle) < 0.0 {
             low = middle
         } else {
             high = middle
@@ -54,10 +59,24 @@ pub(crate) fn kept_gap_m(idm: &Idm, v_m_s: f64, limit_m_s: f64) -> f64 {
 
 /// The speed at which a flow is greatest, m/s, searched up to `top_m_s`; `flow` has one maximum.
 fn best_speed_m_s(top_m_s: f64, flow: impl Fn(f64) -> f64) -> f64 {
+    let (low, high) = best_speed_between_m_s(top_m_s, flow, |_, _| false);
+    0.5 * (low + high)
+}
+
+/// The interval around [`best_speed_m_s`] down to which the search gets, or the first that is narrow
+/// `enough`.
+fn best_speed_between_m_s(
+    top_m_s: f64,
+    flow: impl Fn(f64) -> f64,
+    enough: impl Fn(f64, f64) -> bool,
+) -> (f64, f64) {
     let (mut low, mut high) = (0.0, top_m_s);
     let mut inner = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
     let mut flows = (flow(inner.0), flow(inner.1));
     for _ in 0..CUTS {
+        if enough(low, high) {
+            break;
+        }
         if flows.0 > flows.1 {
             high = inner.1;
             inner = (high - GOLDEN * (high - low), inner.0);
@@ -68,13 +87,17 @@ fn best_speed_m_s(top_m_s: f64, flow: impl Fn(f64) -> f64) -> f64 {
             flows = (flows.1, flow(inner.1));
         }
     }
-    0.5 * (low + high)
+    (low, high)
 }
 
-/// The speed at which a lane of drivers like this one carries most, m/s.
-pub(crate) fn critical_speed_m_s(idm: &Idm, limit_m_s: f64, length_m: f64) -> f64 {
+/// Whether a speed, m/s, is at least the one at which a lane of drivers like this one carries most.
+pub(crate) fn is_critical_speed(idm: &Idm, limit_m_s: f64, length_m: f64, v_m_s: f64) -> bool {
     let top_m_s = idm.desired_speed_m_s.min(limit_m_s);
-    best_speed_m_s(top_m_s, |v| v / (length_m + kept_gap_m(idm, v, limit_m_s)))
+    let flow = |v: f64| v / (length_m + kept_gap_m(idm, v, limit_m_s));
+    // The search ends once it is known on which side of the best speed this one is.
+    let (low, high) =
+        best_speed_between_m_s(top_m_s, flow, |low, high| v_m_s >= high || v_m_s < low);
+    v_m_s >= 0.5 * (low + high)
 }
 
 /// The most that a lane carries in equilibrium, and where.
@@ -146,6 +169,11 @@ mod tests {
         Idm::new(33.3, 1.6, 2.0, 0.73, 1.67, 9.0)
     }
 
+    fn critical_speed_m_s(idm: &Idm, limit_m_s: f64, length_m: f64) -> f64 {
+        let top_m_s = idm.desired_speed_m_s.min(limit_m_s);
+        best_speed_m_s(top_m_s, |v| v / (length_m + kept_gap_m(idm, v, limit_m_s)))
+    }
+
     #[test]
     fn the_kept_gap_is_where_the_law_neither_accelerates_nor_brakes() {
         for v in [1.0, 10.0, 25.0, 33.0] {
@@ -160,7 +188,10 @@ mod tests {
     #[test]
     fn no_speed_carries_more_than_the_critical_one() {
         let flow = |v: f64| v / (4.6 + kept_gap_m(&car(), v, 99.0));
-        let best = flow(critical_speed_m_s(&car(), 99.0, 4.6));
+        let critical_m_s = critical_speed_m_s(&car(), 99.0, 4.6);
+        let best = flow(critical_m_s);
+        assert!(is_critical_speed(&car(), 99.0, 4.6, critical_m_s * (1.0 + 1e-6)));
+        assert!(!is_critical_speed(&car(), 99.0, 4.6, critical_m_s * (1.0 - 1e-6)));
         for k in 1..=333 {
             assert!(flow(0.1 * f64::from(k)) <= best * (1.0 + 1e-9), "{k}");
         }

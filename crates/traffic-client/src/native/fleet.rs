@@ -139,6 +139,9 @@ impl Fleet {
     /// Restores the order of a range after a step. Insertion sort: in one step few vehicles overtake.
     pub(crate) fn sort(&mut self, range: Range<usize>) {
         for i in range.start + 1..range.end {
+            if self.s_m[i - 1] < self.s_m[i] {
+                continue;
+            }
             let mut j = i;
             while j > range.start && self.is_ahead(j - 1, j) {
                 self.swap(j - 1, j);

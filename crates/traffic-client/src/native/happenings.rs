@@ -79,15 +79,20 @@ impl Engine {
         time_s + TICK_S * (self.state.tick as f64 - tick as f64)
     }
 
+    /// Whether anything is in the way in this tick, or an emergency vehicle under way.
+    pub(super) fn is_eventful(&self) -> bool {
+        !self.blocks.is_empty() || !self.rushing.is_empty()
+    }
+
     /// Brings the plot up to this tick.
     pub(super) fn happen(&mut self) {
-        let config = self.config.clone();
-        let schedule = &config.schedule;
         self.blocks.clear();
         self.rushing.clear();
-        if schedule.is_empty() {
+        if self.config.schedule.is_empty() {
             return;
         }
+        let config = self.config.clone();
+        let schedule = &config.schedule;
         let time_s = self.time_s();
         self.limit_m_s = schedule.limit_m_s(time_s).unwrap_or(f64::INFINITY);
         self.state.plot.stage.update(schedule, time_s, &self.ego);

@@ -4,7 +4,7 @@ use tractrix_core::VehicleClass;
 
 use super::driver::Driver;
 use super::engine::{Engine, TICK_S};
-use super::equilibrium::{critical_speed_m_s, easy_speed_m_s};
+use super::equilibrium::{easy_speed_m_s, is_critical_speed};
 use super::fleet::Fleet;
 use super::lanes::LaneUse;
 use crate::philox::{Draws, Stream};
@@ -190,6 +190,5 @@ pub(super) fn entry_speed_m_s(
     if easy_m_s >= least_m_s {
         return Some(easy_m_s);
     }
-    let critical_m_s = critical_speed_m_s(idm, desired_m_s, driver.length_m);
-    (easy_m_s >= critical_m_s.min(least_m_s)).then_some(easy_m_s)
+    is_critical_speed(idm, desired_m_s, driver.length_m, easy_m_s).then_some(easy_m_s)
 }

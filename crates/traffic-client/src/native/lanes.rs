@@ -72,20 +72,26 @@ impl Lane {
         self.center_d_m[k] + f * (self.center_d_m[k + 1] - self.center_d_m[k])
     }
 
-    /// Slope of the centre against the reference line, dimensionless, positive to the left.
-    pub(crate) fn slope(&self, s_m: f64) -> f64 {
-        let k = self.cell(s_m).0;
-        (self.center_d_m[k + 1] - self.center_d_m[k]) * CELLS_PER_M
+    /// [`Self::center_d_m`] and the width, m.
+    pub(crate) fn center_and_width_m(&self, s_m: f64) -> (f64, f64) {
+        let (k, f) = self.cell(s_m);
+        let at = |table: &[f64]| table[k] + f * (table[k + 1] - table[k]);
+        (at(&self.center_d_m), at(&self.width_m))
     }
 
-    /// Width, m.
-    pub(crate) fn width_m(&self, s_m: f64) -> f64 {
+    /// [`Self::center_d_m`], and its slope against the reference line, dimensionless, positive to
+    /// the left.
+    pub(crate) fn center_and_slope(&self, s_m: f64) -> (f64, f64) {
         let (k, f) = self.cell(s_m);
-        self.width_m[k] + f * (self.width_m[k + 1] - self.width_m[k])
+        let (from_m, to_m) = (self.center_d_m[k], self.center_d_m[k + 1]);
+        (from_m + f * (to_m - from_m), (to_m - from_m) * CELLS_PER_M)
     }
 
     /// Limits and neighbours at a station.
     pub(crate) fn section(&self, s_m: f64) -> &Section {
+        if let [only] = &self.sections[..] {
+            return only;
+        }
         &self.sections[self.section[self.cell(s_m).0] as usize]
     }
 
@@ -182,9 +188,14 @@ pub struct LaneMap {
     /// Start and end of the road, m.
     pub(crate) s_start_m: f64,
     pub(crate) s_end_m: f64,
+    /// Sine of the grade in each cell; one where it is the same all along.
     sin_grade: Vec<f64>,
     ends_early: Vec<bool>,
     left_of_three: Vec<bool>,
+    one_limit: bool,
+    needs: bool,
+    /// Lanes to the left and right, where they are the same from the start of the road to its end.
+    beside_throughout: Vec<Option<(u16, u16)>>,
 }
 
 impl LaneMap {
@@ -198,15 +209,54 @@ impl LaneMap {
             (0..lanes.len() as u16).filter(|&k| lanes[k as usize].usage == LaneUse::Exit).collect();
         exits.sort_by(|&a, &b| lanes[a as usize].s_start_m.total_cmp(&lanes[b as usize].s_start_m));
         let cells = libm::ceil((s_end_m - s_start_m) * CELLS_PER_M).max(1.0) as usize;
-        let sin_grade = (0..cells)
+        let mut sin_grade: Vec<f64> = (0..cells)
             .map(|k| libm::sin(grade_rad((s_start_m + (k as f64 + 0.5) * CELL_M).min(s_end_m))))
             .collect();
-        let ends_early = lanes
+        if sin_grade.windows(2).all(|w| w[0] == w[1]) {
+            sin_grade.truncate(1);
+        }
+        let ends_early: Vec<bool> = lanes
             .iter()
             .map(|lane| (lane.drops || lane.leaves) && lane.s_end_m < s_end_m - 1.0)
             .collect();
         let left_of_three = (0..lanes.len()).map(|k| is_left_of_three(&lanes, k as u16)).collect();
-        Self { lanes, exits, s_start_m, s_end_m, sin_grade, ends_early, left_of_three }
+        let rules = |s: &Section| (s.limit_m_s, s.lower);
+        let mut sections = lanes.iter().flat_map(|lane| &lane.sections).map(rules);
+        let first = sections.next();
+        let one_limit = sections.all(|rules| Some(rules) == first);
+        let needs = !exits.is_empty() || ends_early.contains(&true);
+        let is_throughout = |k: u16| {
+            let whole = |l: &Lane| l.s_start_m <= s_start_m && l.s_end_m >= s_end_m;
+            k == NO_LANE || lanes.get(k as usize).is_some_and(whole)
+        };
+        let beside_throughout = lanes.iter().map(|lane| match lane.sections[..] {
+            [Section { beside, .. }] => {
+                (is_throughout(beside.0) && is_throughout(beside.1)).then_some(beside)
+            }
+            _ => None,
+        });
+        Self {
+            exits,
+            s_start_m,
+            s_end_m,
+            sin_grade,
+            ends_early,
+            left_of_three,
+            one_limit,
+            needs,
+            beside_throughout: beside_throughout.collect(),
+            lanes,
+        }
+    }
+
+    /// Does anybody on it have to change lanes, if nothing happens?
+    pub(crate) fn has_needs(&self) -> bool {
+        self.needs
+    }
+
+    /// Does one speed limit hold in all lanes, all along?
+    pub(crate) fn has_one_limit(&self) -> bool {
+        self.one_limit
     }
 
     /// Is the road the same all along: no lane begins or ends, one limit for each, one grade?
@@ -217,7 +267,7 @@ impl LaneMap {
                     && lane.s_start_m < self.s_start_m + 1.0
                     && lane.s_end_m > self.s_end_m - 1.0
         };
-        self.lanes.iter().all(whole) && self.sin_grade.windows(2).all(|w| w[0] == w[1])
+        self.lanes.iter().all(whole) && self.sin_grade.len() == 1
     }
 
     /// Is it the leftmost of three or more lanes?
@@ -233,6 +283,12 @@ impl LaneMap {
 
     /// Lanes to the left and right of a lane at a station, [`NO_LANE`] if there is none.
     pub(crate) fn beside(&self, lane: u16, s_m: f64) -> (u16, u16) {
+        if let Some(beside) = self.beside_throughout[lane as usize]
+            && s_m >= self.s_start_m
+            && s_m <= self.s_end_m
+        {
+            return beside;
+        }
         let lane = &self.lanes[lane as usize];
         let there = |k: u16| {
             let reaches = |l: &Lane| s_m >= l.s_start_m && s_m <= l.s_end_m;

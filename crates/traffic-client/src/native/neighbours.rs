@@ -81,8 +81,8 @@ impl Neighbourhood {
         let nobody = vec![NOBODY; tracks];
         let ends = in_pieces(workers, ranges(over.clone(), piece), |_, range| {
             let (mut ahead, mut behind) = (nobody.clone(), nobody.clone());
-            seen.visit_front_first(range.clone(), &mut ahead, |_, _| {});
-            seen.visit_back_first(range, &mut behind, |_, _| {});
+            seen.visit_front_first(range.clone(), &mut ahead, |_, _, _, _| {});
+            seen.visit_back_first(range, &mut behind, |_, _, _, _| {});
             (ahead, behind)
         });
         let pieces = n.div_ceil(piece);
@@ -109,7 +109,7 @@ fn nearer(far: &[u32], near: &[u32]) -> Vec<u32> {
     far.iter().zip(near).map(|(&f, &n)| if n == NOBODY { f } else { n }).collect()
 }
 
-fn look([own, left, right]: [u16; 3], nearest: &[u32]) -> [u32; 3] {
+fn look(own: u16, left: u16, right: u16, nearest: &[u32]) -> [u32; 3] {
     let spare = nearest.len() - 1;
     let own = nearest[own as usize];
     if left == NO_LANE && right == NO_LANE {
@@ -132,43 +132,43 @@ impl Seen<'_> {
     ) {
         let Found { lanes, leader, follower } = found;
         let range = from..from + lanes.len();
-        for (i, lanes) in range.clone().zip(lanes.iter_mut()) {
-            let lane = self.fleet.lane[i];
-            let (left, right) = if look_aside(i) {
-                self.map.beside(lane, self.fleet.s_m[i])
-            } else {
-                (NO_LANE, NO_LANE)
-            };
-            *lanes = [lane, left, right];
-        }
         // From the front: the last one seen in a lane is the leader of the next one.
-        self.visit_front_first(range.clone(), ahead, |i, nearest| {
-            leader[i - from] = look(lanes[i - from], nearest);
+        let mut found = lanes.iter_mut().zip(leader).rev();
+        self.visit_front_first(range.clone(), ahead, |i, lane, s_m, nearest| {
+            let beside =
+                if look_aside(i) { self.map.beside(lane, s_m) } else { (NO_LANE, NO_LANE) };
+            if let Some((lanes, leader)) = found.next() {
+                *lanes = [lane, beside.0, beside.1];
+                // Not read back, which would wait for the three to be stored.
+                *leader = look(lane, beside.0, beside.1, nearest);
+            }
         });
-        self.visit_back_first(range, behind, |i, nearest| {
-            follower[i - from] = look(lanes[i - from], nearest);
+        let mut found = lanes.iter().zip(follower);
+        self.visit_back_first(range, behind, |_, _, _, nearest| {
+            if let Some((lanes, follower)) = found.next() {
+                *follower = look(lanes[OWN], lanes[LEFT], lanes[RIGHT], nearest);
+            }
         });
     }
 
-    /// Visits a range from its front, with the nearest one ahead in each lane; `nearest` begins with
-    /// those ahead of the range.
+    /// Visits a range from its front (index, lane, station m), with the nearest one ahead in each
+    /// lane; `nearest` begins with those ahead of the range.
     fn visit_front_first(
         &self,
         range: Range<usize>,
         nearest: &mut [u32],
-        mut visit: impl FnMut(usize, &[u32]),
+        mut visit: impl FnMut(usize, u16, f64, &[u32]),
     ) {
-        let s_m = &self.fleet.s_m;
-        let mut spans = self.ego.spans().iter().rev().peekable();
-        if let Some(&next_m) = s_m.get(range.end) {
-            while spans.next_if(|e| e.front_m > next_m).is_some() {}
-        }
-        for i in range.rev() {
-            while let Some(span) = spans.next_if(|e| e.front_m > s_m[i]) {
+        let next_m = self.fleet.s_m.get(range.end).copied().unwrap_or(f64::INFINITY);
+        let mut spans = self.ego.spans().iter().rev().skip_while(|e| e.front_m > next_m);
+        let mut next = spans.next();
+        for (i, lane, target, s_m) in self.each(range).rev() {
+            while let Some(span) = next.filter(|e| e.front_m > s_m) {
                 nearest[span.lane as usize] = EGO;
+                next = spans.next();
             }
-            visit(i, nearest);
-            self.mark(i, nearest);
+            visit(i, lane, s_m, nearest);
+            mark(i, lane, target, nearest);
         }
     }
 
@@ -177,26 +177,37 @@ impl Seen<'_> {
         &self,
         range: Range<usize>,
         nearest: &mut [u32],
-        mut visit: impl FnMut(usize, &[u32]),
+        mut visit: impl FnMut(usize, u16, f64, &[u32]),
     ) {
-        let s_m = &self.fleet.s_m;
-        let mut spans = self.ego.spans().iter().peekable();
-        if let Some(&last_m) = range.start.checked_sub(1).and_then(|k| s_m.get(k)) {
-            while spans.next_if(|e| e.front_m <= last_m).is_some() {}
-        }
-        for i in range {
-            while let Some(span) = spans.next_if(|e| e.front_m <= s_m[i]) {
+        let last_m = range.start.checked_sub(1).and_then(|k| self.fleet.s_m.get(k));
+        let last_m = last_m.copied().unwrap_or(f64::NEG_INFINITY);
+        let mut spans = self.ego.spans().iter().skip_while(|e| e.front_m <= last_m);
+        let mut next = spans.next();
+        for (i, lane, target, s_m) in self.each(range) {
+            while let Some(span) = next.filter(|e| e.front_m <= s_m) {
                 nearest[span.lane as usize] = EGO;
+                next = spans.next();
             }
-            visit(i, nearest);
-            self.mark(i, nearest);
+            visit(i, lane, s_m, nearest);
+            mark(i, lane, target, nearest);
         }
     }
 
-    fn mark(&self, i: usize, nearest: &mut [u32]) {
-        nearest[self.fleet.lane[i] as usize] = i as u32;
-        if self.fleet.is_changing(i) {
-            nearest[self.fleet.target[i] as usize] = i as u32;
-        }
+    /// Index, lane, target and station of those in a range.
+    fn each(
+        &self,
+        range: Range<usize>,
+    ) -> impl DoubleEndedIterator<Item = (usize, u16, u16, f64)> + ExactSizeIterator {
+        let Fleet { s_m, lane, target, .. } = self.fleet;
+        let lanes = lane[range.clone()].iter().zip(&target[range.clone()]);
+        let there = range.clone().zip(lanes.zip(&s_m[range]));
+        there.map(|(i, ((&lane, &target), &s_m))| (i, lane, target, s_m))
+    }
+}
+
+fn mark(i: usize, lane: u16, target: u16, nearest: &mut [u32]) {
+    nearest[lane as usize] = i as u32;
+    if target != NO_LANE {
+        nearest[target as usize] = i as u32;
     }
 }

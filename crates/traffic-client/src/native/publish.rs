@@ -31,11 +31,11 @@ pub(crate) fn progress_of(done: f64) -> f64 {
 }
 
 /// Writes the vehicles within the scene's radius of `ego_s_m` into the scene, `tau_s` after the
-/// tick. Map poses are those on `poses`; NaN without.
+/// tick. Those whose front is within `poses_within_m` of it have poses on the road; NaN without.
 pub(crate) fn publish(
     engine: &Engine,
     road: &Road,
-    poses: Option<&Road>,
+    poses_within_m: f64,
     ego_s_m: f64,
     tau_s: f64,
     scene: &mut Scene,
@@ -56,8 +56,8 @@ pub(crate) fn publish(
         let rear_s_m = front_s_m - driver.length_m;
         let middle_m = 0.5 * (front_s_m + rear_s_m);
         let lane = &map.lanes[fleet.lane[i] as usize];
-        let mut d_m = lane.center_d_m(middle_m);
-        let mut lateral_speed_m_s = lane.slope(middle_m) * speed_m_s;
+        let (mut d_m, slope) = lane.center_and_slope(middle_m);
+        let mut lateral_speed_m_s = slope * speed_m_s;
         let target = fleet.target[i];
         if target != NO_LANE {
             let (done, rate) = quintic((fleet.clock_s[i] + tau_s) / driver.lane_change_s);
@@ -65,11 +65,13 @@ pub(crate) fn publish(
             d_m += done * way_m;
             lateral_speed_m_s += rate * way_m / driver.lane_change_s;
         }
-        let (x_m, y_m, yaw_rad) = poses.map_or((f64::NAN, f64::NAN, f64::NAN), |road| {
+        let (x_m, y_m, yaw_rad) = if (front_s_m - ego_s_m).abs() <= poses_within_m {
             let at = road.at(middle_m, d_m);
             let turned_rad = libm::atan2(lateral_speed_m_s, speed_m_s.max(1.0));
             (at.x_m, at.y_m, at.heading_rad + turned_rad)
-        });
+        } else {
+            (f64::NAN, f64::NAN, f64::NAN)
+        };
         scene.neighbours.push(Neighbour {
             id: fleet.id[i],
             class: driver.class,

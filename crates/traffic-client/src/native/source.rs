@@ -27,8 +27,8 @@ pub struct NativeTraffic {
     /// Start of the current tick; `None` before the first call.
     tick_start: Option<Time>,
     scene: Scene,
-    /// Scenes have map poses.
-    map_poses: bool,
+    /// Vehicles so near have map poses in scenes, m.
+    poses_within_m: f64,
 }
 
 impl Clone for NativeTraffic {
@@ -40,12 +40,13 @@ impl Clone for NativeTraffic {
     }
 
     fn clone_from(&mut self, from: &Self) {
-        let Self { engine, road, geometry, tick_start, scene, map_poses } = from;
+        let Self { engine, road, geometry, tick_start, scene, poses_within_m } = from;
         self.engine.clone_from(engine);
         self.road.clone_from(road);
         self.scene.time = scene.time;
         self.scene.neighbours.clone_from(&scene.neighbours);
-        (self.geometry, self.tick_start, self.map_poses) = (*geometry, *tick_start, *map_poses);
+        (self.geometry, self.tick_start) = (*geometry, *tick_start);
+        self.poses_within_m = *poses_within_m;
     }
 }
 
@@ -115,7 +116,7 @@ impl NativeTraffic {
             engine.commit();
         }
         let scene = Scene::default();
-        Ok(Self { engine, road, geometry, tick_start: None, scene, map_poses: true })
+        Ok(Self { engine, road, geometry, tick_start: None, scene, poses_within_m: f64::INFINITY })
     }
 
     /// Traffic that goes on from the last scene of another source, as seen by an ego at `now`: its
@@ -180,10 +181,11 @@ impl NativeTraffic {
         &self.scene
     }
 
-    /// Whether scenes have map poses (the default). Without, `x_m`, `y_m` and `yaw_rad` are NaN and
-    /// a scene costs less; road coordinates are the same.
-    pub fn set_map_poses(&mut self, wanted: bool) {
-        self.map_poses = wanted;
+    /// How near to the ego vehicles have map poses in scenes, station of the front from that of the
+    /// ego, m (all by default). Without, `x_m`, `y_m` and `yaw_rad` are NaN and a scene costs less;
+    /// road coordinates are the same.
+    pub fn set_map_poses_within_m(&mut self, distance_m: f64) {
+        self.poses_within_m = distance_m;
     }
 
     /// Goes on with the draws of another seed: arrivals and drivers to come, what those on the road
@@ -288,10 +290,10 @@ impl NativeTraffic {
             self.engine.ego.clear();
             return;
         }
-        let heading = self.road.at(ego.s_m, ego.d_m).heading_rad;
+        let heading = self.road.line().heading_rad(ego.s_m);
         let shift_m = -ego.speed_m_s * now.seconds_since(tick);
-        let map = self.engine.map.clone();
-        self.engine.ego.update(ego, &self.geometry, &map, heading, shift_m);
+        let Engine { ego: spans, map, .. } = &mut self.engine;
+        spans.update(ego, &self.geometry, map, heading, shift_m);
     }
 }
 
@@ -329,9 +331,8 @@ impl TrafficSource for NativeTraffic {
             self.engine.decide();
         }
         self.tick_start = Some(start);
-        let poses = self.map_poses.then_some(&*self.road);
         let tau_s = now.seconds_since(start);
-        publish(&self.engine, &self.road, poses, ego.s_m, tau_s, &mut self.scene);
+        publish(&self.engine, &self.road, self.poses_within_m, ego.s_m, tau_s, &mut self.scene);
         self.scene.time = now;
         Ok(&self.scene)
     }

@@ -340,7 +340,7 @@ fn a_restored_state_with_another_seed_goes_on_as_that_seed_says() {
     let mut drive = |seed: Option<u64>| {
         other.restore(&first.snapshot());
         seed.into_iter().for_each(|seed| other.reseed(seed));
-        other.set_map_poses(seed.is_none());
+        other.set_map_poses_within_m(if seed.is_none() { f64::INFINITY } else { -1.0 });
         let scene = other.advance(Time(0), &ego).unwrap();
         assert!(scene.neighbours.iter().all(|n| n.x_m.is_finite() == seed.is_none()));
         for k in 1..300 {

@@ -43,16 +43,18 @@ pub fn frame(
     write_row(&mut out, 0, ego_row);
     let dx = |n: &Neighbour| 0.5 * (n.front_s_m + n.rear_s_m) - ego.s_m;
     let mut put = |first_row: usize, rows: usize, wanted: &dyn Fn(f64) -> bool| {
-        let mut farther_than = (-1.0, 0);
-        for row in 0..rows {
-            // The next nearest after the one in the row before; ties go by identifier
-            let key = |n: &Neighbour| (libm::hypot(dx(n), n.d_m - ego.d_m), n.id);
-            let next =
-                scene.neighbours.iter().filter(|n| wanted(dx(n)) && key(n) > farther_than).min_by(
-                    |a, b| key(a).partial_cmp(&key(b)).unwrap_or(core::cmp::Ordering::Equal),
-                );
-            let Some(n) = next else { break };
-            farther_than = key(n);
+        // The nearest first; ties go by identifier
+        let mut nearest: [Option<((f64, u64), &Neighbour)>; AHEAD_ROWS] = [None; AHEAD_ROWS];
+        let nearest = &mut nearest[..rows];
+        for n in scene.neighbours.iter().filter(|n| wanted(dx(n))) {
+            let key = (libm::hypot(dx(n), n.d_m - ego.d_m), n.id);
+            let is_place = |other: &Option<((f64, u64), _)>| other.is_none_or(|(k, _)| key < k);
+            if let Some(place) = nearest.iter().position(is_place).filter(|_| key.0 >= 0.0) {
+                nearest[place..].rotate_right(1);
+                nearest[place] = Some((key, n));
+            }
+        }
+        for (row, (_, n)) in nearest.iter().flatten().enumerate() {
             let right = ego.d_m - n.d_m;
             let closing = ego.speed_m_s - n.speed_m_s;
             let drift = ego.lateral_speed_m_s - n.lateral_speed_m_s;
