@@ -6,6 +6,7 @@
 //! 1. the *population* (desired speed, headway and how both scatter, standstill gap, acceleration,
 //!    braking, MOBIL's politeness, threshold and bias), in *bounded* traffic: it begins with the
 //!    vehicles of a recording and gets its arrivals and the speed at its end from it ([`Boundary`]);
+//!    drivers stand where they would have to creep (`human.creep_m_s`), as measured ones do;
 //! 2. how the drivers of *free* traffic follow, and its *rim*: it gets flow, density, classes and
 //!    mean and standard deviation of the speeds at both ends of each recording, and four numbers,
 //!    the same for all recordings, say how these become a boundary. Bounded traffic is told where a

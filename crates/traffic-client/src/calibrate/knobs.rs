@@ -22,6 +22,10 @@ pub(super) struct Knob {
 /// forget a jam that the stretch began with and that neither end shows.
 const WARM_UP_S: f64 = 20.0;
 
+/// Slowest speed of these drivers behind another one, m/s: that of a car in first gear at idle, about
+/// 5 km/h. With 1 or 2 m/s held-back recordings are nearly as close; creeping, they are not.
+const CREEP_M_S: f64 = 1.5;
+
 /// Search goes this many standard deviations to either side of the usual value.
 const REACH: f64 = 3.0;
 
@@ -125,6 +129,7 @@ pub(super) fn with_population(
         change(class);
     }
     config.max_speed_m_s = max_speed;
+    config.human.creep_m_s = CREEP_M_S;
     config
 }
 

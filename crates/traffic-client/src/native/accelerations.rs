@@ -45,8 +45,13 @@ impl Engine {
     /// limit comes, towards that at its start, `-b_kin²/b` with the braking `b_kin` that it takes
     /// (the IDM's own strategy, Treiber & Kesting 2013, Eq. 11.17).
     pub(super) fn free_m_s2(&self, i: usize, lane: u16) -> f64 {
+        self.free_at_m_s2(i, lane, self.state.fleet.v_m_s[i])
+    }
+
+    /// The same at another speed.
+    fn free_at_m_s2(&self, i: usize, lane: u16, v: f64) -> f64 {
         let fleet = &self.state.fleet;
-        let (s_m, v) = (fleet.s_m[i], fleet.v_m_s[i]);
+        let s_m = fleet.s_m[i];
         let lane_map = &self.map.lanes[lane as usize];
         let driver = &fleet.driver[i];
         let section = lane_map.section(s_m);
@@ -93,14 +98,20 @@ impl Engine {
     }
 
     /// The same behind somebody whose rear is there, m, and who has that speed, m/s.
-    pub(super) fn behind_that_m_s2(
+    pub(super) fn behind_that_m_s2(&self, i: usize, seen: (f64, f64), frac: f64) -> f64 {
+        self.behind_that_at_m_s2(i, seen, frac, self.state.fleet.v_m_s[i])
+    }
+
+    /// The same at another speed.
+    fn behind_that_at_m_s2(
         &self,
         i: usize,
         (rear_m, speed_m_s): (f64, f64),
         frac: f64,
+        v: f64,
     ) -> f64 {
         let fleet = &self.state.fleet;
-        let (v, idm) = (fleet.v_m_s[i], &fleet.driver[i].idm);
+        let idm = &fleet.driver[i].idm;
         let (gap_m, closing_m_s) = fleet.mind[i].sees(rear_m - fleet.s_m[i], v - speed_m_s);
         idm.content_with(frac).interaction_m_s2(v, gap_m, closing_m_s)
     }
@@ -139,9 +150,33 @@ impl Engine {
         if !self.blocks.is_empty() {
             a = a.min(self.closure_m_s2(i, driven, END_MARGIN_M)).min(self.stop_m_s2(i));
         }
+        let idm = &fleet.driver[i].idm;
         let free_m_s2 = self.free_m_s2(i, driven);
-        let accel_m_s2 = fleet.driver[i].idm.lesser_m_s2(free_m_s2, a);
+        let mut accel_m_s2 = idm.lesser_m_s2(free_m_s2, a);
+        if self.stands(i, driven) {
+            accel_m_s2 = accel_m_s2.min(if fleet.v_m_s[i] > 0.0 { -idm.decel_m_s2 } else { 0.0 });
+        }
         Wanted { accel_m_s2, free_m_s2: Some(free_m_s2) }
+    }
+
+    /// Whether a driver stops, or stays where he stands: he is slower than anybody drives, and could
+    /// not even drive that slowly ([`super::HumanConfig::creep_m_s`]).
+    fn stands(&self, i: usize, driven: u16) -> bool {
+        let (fleet, creep_m_s) = (&self.state.fleet, self.config.human.creep_m_s);
+        if fleet.v_m_s[i] >= creep_m_s {
+            return false;
+        }
+        let frac = fleet.mind[i].headway_frac;
+        let taken = |side: usize, lane: u16| {
+            let seen = self.rear_and_speed(self.near.leader[i][side], lane);
+            seen.map_or(0.0, |seen| self.behind_that_at_m_s2(i, seen, frac, creep_m_s))
+        };
+        let mut a = taken(OWN, fleet.lane[i]);
+        if fleet.is_changing(i) {
+            a = a.min(taken(self.side_of(i, driven), driven));
+        }
+        let free = self.free_at_m_s2(i, driven, creep_m_s);
+        fleet.driver[i].idm.lesser_m_s2(free, a) < 0.0
     }
 
     fn side_of(&self, i: usize, lane: u16) -> usize {

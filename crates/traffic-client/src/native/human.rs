@@ -9,6 +9,10 @@
 //!   Res. Record 2316 (2012) 47): who changes lanes, and who is cut in on, takes a gap shorter than
 //!   he would choose, down to `least_headway_s`, and goes back to his own headway with the time
 //!   constant `relaxation_s`.
+//! - *Standing*: behind another one nobody drives slower than `creep_m_s`. Who would have to stops,
+//!   and stands until he could drive that fast (in the way of slow-to-start rules: Barlovic, Santen,
+//!   Schadschneider, Schreckenberg, Eur. Phys. J. B 5 (1998) 793). Without, drivers roll up to their
+//!   standstill gap ever more slowly, as the IDM does.
 //! - *Memory*: a change is not undone within `keep_lane_s` unless its cause is gone.
 //!
 //! Left out: the reaction time of that paper, which its anticipation of several leaders makes up
@@ -35,6 +39,8 @@ pub struct HumanConfig {
     pub least_headway_s: f64,
     /// A lane change is not undone for so long unless its cause is gone, s.
     pub keep_lane_s: f64,
+    /// Slowest speed that drivers keep up behind another vehicle, m/s; 0: they creep.
+    pub creep_m_s: f64,
 }
 
 impl Default for HumanConfig {
@@ -48,13 +54,14 @@ impl Default for HumanConfig {
             relaxation_s: 25.0,
             least_headway_s: 0.56,
             keep_lane_s: 15.0,
+            creep_m_s: 0.0,
         }
     }
 }
 
 impl HumanConfig {
     /// Keys, values and ranges.
-    pub(crate) fn ranges(&self) -> [(&'static str, f64, f64, f64); 6] {
+    pub(crate) fn ranges(&self) -> [(&'static str, f64, f64, f64); 7] {
         [
             ("human.gap_error_frac", self.gap_error_frac, 0.0, 0.2),
             ("human.closing_error_1_s", self.closing_error_1_s, 0.0, 0.05),
@@ -62,6 +69,7 @@ impl HumanConfig {
             ("human.relaxation_s", self.relaxation_s, 1.0, 600.0),
             ("human.least_headway_s", self.least_headway_s, 0.2, 5.0),
             ("human.keep_lane_s", self.keep_lane_s, 0.0, 600.0),
+            ("human.creep_m_s", self.creep_m_s, 0.0, 3.0),
         ]
     }
 

@@ -40,6 +40,8 @@ pub use workers::{InTurn, Piece, Workers};
 #[cfg(test)]
 mod population_tests;
 #[cfg(test)]
+mod standing_tests;
+#[cfg(test)]
 mod tests;
 #[cfg(test)]
 mod workers_tests;
