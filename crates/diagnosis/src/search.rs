@@ -11,10 +11,13 @@ use crate::evidence::Evidence;
 use crate::hypothesis::{CATALOGUE, Hypothesis};
 use crate::param::{PARAMS, Spec, Theta};
 use crate::refit::Fit;
+use crate::replay::affects;
 use crate::screen::{Candidate, Screen, outside};
 
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
+/// Linear gain below which a hypothesis is not refitted, nats.
+const LEAST_GAIN: f64 = 2.0;
 /// Pairs refitted.
 const PAIRS: usize = 3;
 
@@ -50,7 +53,42 @@ impl dyn Evidence + '_ {
         {
             best = self.drop_and_swap(better, open, zero_norm);
         }
+        if let Some(one) = self.one_for_all(&best, &empty, open, zero_norm) {
+            best = one;
+        }
         Some((empty, best))
+    }
+
+    /// One cause that says as much as a set of several. Near the limit of stability a linear gain says
+    /// little of what a cause explains, and one that begins far down the list is never fitted: where
+    /// the largest is less than half of what the set explains, each cause that shows where the set
+    /// does is fitted for itself, from one prior deviation to every side.
+    fn one_for_all(&self, best: &Fit, empty: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
+        if best.set.len() < 2 {
+            return None;
+        }
+        let candidates = self.screen(empty, &outside(empty, open)).singles(None);
+        if candidates.first()?.gain > 0.5 * best.log_z {
+            return None;
+        }
+        let groups = |h: usize| CATALOGUE[h].sizes.iter().flat_map(|p| affects(*p));
+        let shows =
+            |h: usize| groups(h).any(|g| best.set.iter().any(|k| groups(*k).any(|x| x == g)));
+        let mut tried: Vec<usize> = Vec::new();
+        let mut winner: Option<Fit> = None;
+        for c in candidates.iter().filter(|c| shows(c.hypothesis)) {
+            if tried.contains(&c.hypothesis) || c.gain < LEAST_GAIN {
+                continue;
+            }
+            tried.push(c.hypothesis);
+            let from = to_all_sides(&CATALOGUE[c.hypothesis]);
+            if let Some(f) = self.with_added_from(empty, c, &from, zero_norm)
+                && f.log_z > winner.as_ref().map_or(best.log_z, |w| w.log_z)
+            {
+                winner = Some(f);
+            }
+        }
+        winner
     }
 
     /// Two causes at once where one at a time stops: every member in turn (or nothing) is replaced
@@ -104,7 +142,7 @@ impl dyn Evidence + '_ {
             if c.gain < least * top && !(best.set.is_empty() && hyp.nonlinear()) {
                 continue;
             }
-            if c.gain < 2.0 {
+            if c.gain < LEAST_GAIN {
                 continue;
             }
             tried.push(c.hypothesis);
@@ -120,6 +158,18 @@ impl dyn Evidence + '_ {
     /// The set with a candidate added, fitted from its start; from all of its starts if its shape is
     /// a switch, which a fit holds, or one that gets stuck.
     pub(crate) fn with_added(&self, best: &Fit, c: &Candidate, zero_norm: f64) -> Option<Fit> {
+        let sides = sides(&CATALOGUE[c.hypothesis], &c.sizes);
+        self.with_added_from(best, c, &sides, zero_norm)
+    }
+
+    /// The same from given sizes.
+    fn with_added_from(
+        &self,
+        best: &Fit,
+        c: &Candidate,
+        sides: &[Vec<f64>],
+        zero_norm: f64,
+    ) -> Option<Fit> {
         let hyp = &CATALOGUE[c.hypothesis];
         let starts = if hyp.shapes.iter().any(|p| p.is_switch() || p.is_stuck()) {
             hyp.starts
@@ -128,7 +178,6 @@ impl dyn Evidence + '_ {
         };
         let mut set = best.set.clone();
         set.push(c.hypothesis);
-        let sides = sides(hyp, &c.sizes);
         let fits = starts.iter().flat_map(|start| sides.iter().map(move |sizes| (start, sizes)));
         let fits = fits.filter_map(|(start, sizes)| {
             let mut theta = best.theta;
@@ -223,16 +272,24 @@ fn sides(hyp: &Hypothesis, linear: &[f64]) -> Vec<Vec<f64>> {
         return vec![specs().map(|s| 0.5 * s.step * sign).collect()];
     }
     let mut out = vec![specs().zip(linear).map(|(s, x)| x.clamp(s.lo, s.hi)).collect()];
-    for signs in 0..1_u32 << hyp.sizes.len() {
-        let side = |(k, s): (usize, &Spec)| if signs >> k & 1 == 0 { s.prior } else { -s.prior };
-        out.push(specs().enumerate().map(side).collect());
-    }
+    out.extend(to_all_sides(hyp));
     out
+}
+
+/// One prior deviation to every side that the sizes may have.
+fn to_all_sides(hyp: &Hypothesis) -> Vec<Vec<f64>> {
+    let specs = || hyp.sizes.iter().map(|p| p.spec());
+    let signs = 0..1_u32 << hyp.sizes.len();
+    let side =
+        |signs: u32, k: usize, s: &Spec| if signs >> k & 1 == 0 { s.prior } else { -s.prior };
+    let all = signs.map(|signs| specs().enumerate().map(|(k, s)| side(signs, k, s)).collect());
+    all.filter(|x: &Vec<f64>| hyp.sign == 0.0 || x[0] * hyp.sign > 0.0).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::param::P;
 
     #[test]
     fn a_wind_is_fitted_from_every_side_and_what_is_linear_from_near_nothing() {
@@ -243,5 +300,9 @@ mod tests {
             assert!(wind[1..].contains(&signs.map(|x| 4.0 * x).to_vec()), "{signs:?}");
         }
         assert_eq!(sides(of("mass"), &[0.3]), [[0.005]]);
+        // Where linear gains say little, from both sides; from one what has a sign.
+        assert_eq!(to_all_sides(of("mass")), [[P::Mass.spec().prior], [-P::Mass.spec().prior]]);
+        let play = to_all_sides(of("steering_free_play"));
+        assert_eq!(play, [[P::FreePlay.spec().prior]]);
     }
 }
