@@ -3,7 +3,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::course::Course;
+use crate::course::{Course, weather};
 use crate::decisions::{
     DISPERSION_PRIOR, LONELY, MIN_SIGMAS, OWN_SIZES, OWN_SIZES_PART, PRIOR_CAUSE, SHARED,
     STRONG_NATS, WORTH,
@@ -159,15 +159,15 @@ impl dyn Evidence + '_ {
         })
     }
 
-    /// A size of the `i`-th member is beyond what the drives disagree about, once its own course has
-    /// taken what it can of their disagreement, or without: a course vanishes with its cause and is no
-    /// reason that it might be nothing. Nor is that its form is not known (a wind pushes further
-    /// forward, or blows harder): forms stay where they are, with them a size of nothing is no effect.
+    /// A size of the `i`-th member is beyond what the drives disagree about. Its own course, which
+    /// vanishes with it, is no reason that it might be nothing. Drives do disagree about weather, as its
+    /// course says, and it may blow harder or push further forward: it stands out also once its course
+    /// has taken what it can, and forms stay where they are, with them a size of nothing is no effect.
     fn stands_out(&self, fit: &Fit, member: usize) -> bool {
-        let own = CATALOGUE[fit.set[member]].sizes;
-        let sizes = fit.sizes();
-        let of: Vec<usize> =
-            (0..fit.free.len()).filter(|j| sizes.contains(&fit.free[*j])).collect();
+        let hyp = &CATALOGUE[fit.set[member]];
+        let (own, sizes) = (hyp.sizes, fit.sizes());
+        let asked = |j: &usize| !weather(hyp) || sizes.contains(&fit.free[*j]);
+        let of: Vec<usize> = (0..fit.free.len()).filter(asked).collect();
         let keep: Vec<usize> = core::iter::once(0).chain(of.iter().map(|j| j + 1)).collect();
         let free: Vec<P> = of.iter().map(|j| fit.free[*j]).collect();
         let priors: Vec<Prior> = of.iter().map(|j| fit.priors[*j]).collect();
@@ -183,7 +183,8 @@ impl dyn Evidence + '_ {
                 own.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
             }))
         };
-        [&fit.course.without(own), &fit.course].into_iter().any(|c| beyond(c).unwrap_or(false))
+        beyond(&fit.course.without(own)).unwrap_or(false)
+            || weather(hyp) && beyond(&fit.course).unwrap_or(false)
     }
 
     /// Gain of the `i`-th member on unseen halves of the drives, nats. Its own course is not taken
