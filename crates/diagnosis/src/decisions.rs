@@ -71,6 +71,9 @@ pub(crate) const UNKNOWN_EVIDENCE: f64 = 30.0;
 pub(crate) const AHEAD: f64 = 1.15;
 /// The same above which no further causes are searched, 1: they would only patch.
 pub(crate) const HOPELESS: f64 = 2.0;
+/// Part of the evidence of a set above which the largest linear gain says in what order causes are
+/// fitted, 1: the half; in linear problems it is all.
+pub(crate) const RANKED: f64 = 0.5;
 /// Part of the evidence of several causes of one module above which a free function replaces them if
 /// they leave much over, 1.
 pub(crate) const REPLACED_MANY: f64 = 0.5;

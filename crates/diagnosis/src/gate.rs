@@ -128,12 +128,12 @@ impl dyn Evidence + '_ {
                 let size = hyp.size(&fit.theta, self.zero()).abs();
                 let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, *i);
                 let one = |f: &Fit| hyp.nonlinear() && Self::from_one_drive(&fit, *i, f);
-                let weather = fewer[*i].as_ref().is_none_or(one);
+                let of_one_drive = fewer[*i].as_ref().is_none_or(one);
                 // The set without it is more probable (the median probability model: Barbieri and
                 // Berger, Ann. Statist. 32, 2004).
                 let unlikely =
                     nats.len() > 1 && self.worth(&fit, *i, &nats) + log_odds(PRIOR_CAUSE) < 0.0;
-                small || weather || unlikely || self.folds(&fit, *i) < STRONG_NATS
+                small || of_one_drive || unlikely || self.folds(&fit, *i) < STRONG_NATS
             });
             // The weakest first: beside a cause that is not there the true one may look doubtful, too.
             let weakest = doubtful.min_by(|i, j| nats[*i].total_cmp(&nats[*j]));

@@ -6,7 +6,7 @@
 //! cause, ten for a further one. What a helper would patch of the form of a large cause is in the
 //! score already ([`crate::course`]).
 
-use crate::decisions::{HOPELESS, MIN_EVIDENCE, MIN_FIRST};
+use crate::decisions::{HOPELESS, MIN_EVIDENCE, MIN_FIRST, RANKED};
 use crate::evidence::Evidence;
 use crate::hypothesis::{CATALOGUE, Hypothesis};
 use crate::param::{PARAMS, Spec, Theta};
@@ -68,7 +68,7 @@ impl dyn Evidence + '_ {
             return None;
         }
         let candidates = self.screen(empty, &outside(empty, open)).singles(None);
-        if candidates.first()?.gain > 0.5 * best.log_z {
+        if candidates.first()?.gain > RANKED * best.log_z {
             return None;
         }
         let groups = |h: usize| CATALOGUE[h].sizes.iter().flat_map(|p| affects(*p));

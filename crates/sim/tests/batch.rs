@@ -6,10 +6,39 @@ mod arrays;
 
 use arrays::{Arrays, allowed};
 use sim::batch::{Batch, EnvSnapshot, EnvSpec, Fidelity};
-use sim::{Scenario, SimError, Status, World};
+use sim::{Metrics, Scenario, SimError, Status, World};
 
 fn spec(name: &str, fidelity: Fidelity) -> EnvSpec {
     EnvSpec { start_spread_m: 500.0, ..EnvSpec::new(Scenario::builtin(name).unwrap(), fidelity) }
+}
+
+/// A batch measures collisions alone; what is driven keeps every bit, hashed here by a recorder of the
+/// test's own.
+#[test]
+fn a_world_that_measures_collisions_alone_drives_bit_for_bit_as_one_that_measures_all() {
+    let scenario = Scenario::builtin("table2-dense-12.5").unwrap();
+    let truck = dynamics::TruckParameters::load("reference").unwrap();
+    // It is the yardstick of the figures, not what is driven.
+    let limits = dynamics::TruckModel::new(truck, 20e3).unwrap().vehicle_limits().unwrap();
+    let drive = |only_collisions: bool| {
+        let mut world = World::new(&scenario, 7).unwrap();
+        if only_collisions {
+            world.only_collisions();
+        }
+        let road = std::sync::Arc::new(scenario.load_road().unwrap());
+        let mut hashed = Metrics::new(&limits, &scenario.stack.rss, road);
+        let hashes: Vec<String> = (0..3_000)
+            .map(|_| {
+                assert_eq!(world.tick(&mut hashed).unwrap(), Status::Running);
+                hashed.summary().state_hash
+            })
+            .collect();
+        (hashes, world.collisions(), world.summary().state_hash)
+    };
+    let (all, only) = (drive(false), drive(true));
+    assert_eq!(all.0, only.0);
+    assert_eq!(all.1, only.1);
+    assert!(all.2 != only.2, "the world itself hashes no more");
 }
 
 #[test]
