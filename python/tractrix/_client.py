@@ -91,6 +91,24 @@ class Client:
         """
         return self._get("/api/v1/health")
 
+    def wait_until_ready(self, timeout_s: float = 60.0) -> None:
+        """Returns when there is a run to look at: a server answers before its first tick is driven.
+
+        Raises:
+            Refused: There is still none after `timeout_s` (`no_tick_yet`).
+            httpx.TransportError: Nobody answers there.
+        """
+        deadline = time.monotonic() + timeout_s
+        while True:
+            try:
+                self._get("/api/v1/ready")
+            except Refused as refused:
+                if refused.code != "no_tick_yet" or time.monotonic() >= deadline:
+                    raise
+                time.sleep(0.02)
+            else:
+                return
+
     def sessions(self) -> list[Session]:
         """The sessions of the server."""
         return [
