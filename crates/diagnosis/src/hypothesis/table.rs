@@ -104,8 +104,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     )
     .along(&[Open("engine_speed_rpm"), Fitted("coolant_temp_degc")]),
     h("dragging_brake", &[P::DragBrake], &[], ONE, LONG, 150.0, 1.0).along(&[Open("time_s")]),
+    // Oil that is cold rubs more.
     h("engine_friction", &[P::Friction], &[], ONE, LONG, 0.1, 0.0)
-        .along(&[Open("engine_speed_rpm")]),
+        .along(&[Open("engine_speed_rpm"), Open("time_s")]),
     h(
         "altitude_derate",
         &[P::Altitude],
