@@ -103,7 +103,7 @@ pub struct TrafficConfig {
     /// the USA have left-lane restrictions for trucks of the same kind).
     pub trucks_keep_out_of_left_lane: bool,
     /// Where a lane ends or an exit comes, drivers begin to change lanes this far before, m; those
-    /// of a class whose changes take longer than a car's (`lane_change_s`), as many times as far.
+    /// whose changes take longer than the mean car's (`lane_change_s`), as many times as far.
     pub mandatory_ahead_m: f64,
     /// Braking that a driver accepts to let another one merge, m/s².
     pub yield_decel_m_s2: f64,
