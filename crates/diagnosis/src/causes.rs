@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::course::{Point, signals};
-use crate::decisions::{LISTED_NATS, STRONG_NATS};
+use crate::decisions::{LISTED_NATS, RANKED, STRONG_NATS};
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
 use crate::problem::Problem;
@@ -88,9 +88,9 @@ impl Compared<'_> {
         for c in evidence.screen(fewer, &outside(self.fit, open)).singles(None) {
             let rival = &CATALOGUE[c.hypothesis];
             let (id, mut lost) = (rival.id, lost_nats - c.gain);
-            if lost < LISTED_NATS {
-                // A screen promises more than it keeps; who stands in for a cause passes the gate
-                // that the cause has passed.
+            if lost < LISTED_NATS || c.gain > RANKED * lost_nats {
+                // A screen promises more than it keeps, or less; who stands in for a cause passes
+                // the gate that the cause has passed.
                 if refitted.contains(&c.hypothesis) {
                     continue;
                 }
@@ -148,7 +148,7 @@ pub(crate) fn causes(
         for (j, p) in fit.free.iter().enumerate() {
             if hyp.params().any(|q| q == *p) {
                 let s = p.spec();
-                let x = fit.theta[*p as usize] - zero[*p as usize];
+                let x = p.of_truck(&fit.theta, zero);
                 let sigma = variances[j].sqrt();
                 let value = if s.is_factor() { 1.0 + x } else { x };
                 parameters.insert(s.key, Parameter { value, sigma, unit: s.unit });

@@ -71,8 +71,9 @@ pub(crate) const UNKNOWN_EVIDENCE: f64 = 30.0;
 pub(crate) const AHEAD: f64 = 1.15;
 /// The same above which no further causes are searched, 1: they would only patch.
 pub(crate) const HOPELESS: f64 = 2.0;
-/// Part of the evidence of a set above which the largest linear gain says in what order causes are
-/// fitted, 1: the half; in linear problems it is all.
+/// Part of an evidence above which a linear gain ranks, 1: the half; in linear problems it is all. A set
+/// whose causes' gains are below it is sought without their order, a rival whose gain is above it is
+/// fitted.
 pub(crate) const RANKED: f64 = 0.5;
 /// Part of the evidence of several causes of one module above which a free function replaces them if
 /// they leave much over, 1.

@@ -185,6 +185,7 @@ pub fn diagnose_with(
         gain,
         extended_truck,
         tolerances_from_baseline: baseline.is_some(),
+        side_force: baseline.and_then(|b| b.reference.side_force(plant)),
         drives: used,
         findings,
         models,

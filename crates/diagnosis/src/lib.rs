@@ -106,7 +106,7 @@ pub use report_models::Models;
 pub use table::Table;
 pub use table_trial::{TableTrial, try_table};
 pub use verdict::{
-    BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Parameter, Unknown, Verdict,
-    Wrong,
+    BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Parameter, SideForcePoint,
+    Unknown, Verdict, Wrong,
 };
 pub use whole_run::{Trace, whole_run};

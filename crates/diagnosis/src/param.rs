@@ -90,10 +90,12 @@ pub(crate) enum P {
     RetarderSteep,
     WindBehind,
     CrosswindBehind,
+    SideShare,
+    SideBehind,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 81;
+pub(crate) const PARAMS: usize = 83;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -231,6 +233,9 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     // Edges that suck, gap and rounding move it by a metre or so along the box.
     s(P::WindBehind, "trailer_behind_cg_m", "m", (1.0, -4.0, 4.0, 0.2), 0.0, 0.0),
     s(P::CrosswindBehind, "trailer_behind_cg_m", "m", (1.0, -4.0, 4.0, 0.2), 0.0, 0.0),
+    // The same of the truck in order, whose baseline shows it by the winds of its days.
+    s(P::SideShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
+    s(P::SideBehind, "trailer_behind_cg_m", "m", (1.0, -4.0, 4.0, 0.2), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -270,6 +275,8 @@ impl Spec {
                 | P::CrosswindShare
                 | P::WindBehind
                 | P::CrosswindBehind
+                | P::SideShare
+                | P::SideBehind
                 | P::FuelFlowPower
                 | P::Co2Power
         )
@@ -277,6 +284,17 @@ impl Spec {
 }
 
 impl P {
+    /// What it is off by from the truck file, at `theta` with the reference at `zero`: causes count
+    /// from the baseline, and where winds act from what the baseline has shown of that.
+    pub(crate) fn of_truck(self, theta: &Theta, zero: &Theta) -> f64 {
+        let own = match self {
+            Self::WindShare | Self::CrosswindShare => zero[Self::SideShare as usize],
+            Self::WindBehind | Self::CrosswindBehind => zero[Self::SideBehind as usize],
+            _ => 0.0,
+        };
+        theta[self as usize] - zero[self as usize] + own
+    }
+
     pub(crate) fn spec(self) -> &'static Spec {
         &SPECS[self as usize]
     }

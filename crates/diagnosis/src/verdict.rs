@@ -143,6 +143,17 @@ pub struct Gain {
     pub significant: bool,
 }
 
+/// Where the side force of the wind acts on the truck, as the winds of the baseline's days show.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SideForcePoint {
+    /// Part of it on the tractor, 1: `resistance.side_force_tractor_frac`.
+    pub tractor_frac: f64,
+    /// How far behind its CG the trailer's part acts, m: `resistance.side_force_trailer_behind_cg_m`.
+    pub trailer_behind_cg_m: f64,
+    /// What the baseline says for this point against the truck file's, nats.
+    pub evidence: f64,
+}
+
 /// Everything that was concluded.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
@@ -170,6 +181,8 @@ pub struct Diagnosis {
     pub extended_truck: Option<String>,
     /// Tolerances were learned from a baseline; otherwise they are defaults.
     pub tolerances_from_baseline: bool,
+    /// Where side winds act, if the baseline shows another point than the truck file's.
+    pub side_force: Option<SideForcePoint>,
     /// The drives and what each was used for.
     pub drives: Vec<DriveUse>,
     /// Defects of the data.

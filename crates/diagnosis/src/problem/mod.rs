@@ -4,6 +4,7 @@
 //! tolerances of that drive (load sheet, weather, instruments), scaled by their standard
 //! deviations. Everything that the search needs is a Gram matrix in `M`, kept per drive.
 
+mod attack;
 mod calibrate;
 mod gram;
 mod hat;
@@ -50,6 +51,8 @@ pub(crate) struct Reference {
     /// How much more drives in order scatter about the sizes of every hypothesis than their information
     /// says; empty where no baseline has shown it.
     pub(crate) scatter: Vec<f64>,
+    /// What the baseline says for another point where side winds act than the truck file's, nats.
+    pub(crate) attack: f64,
 }
 
 /// Times that the noise is learned: each needs the tolerances of the one before.
@@ -124,6 +127,7 @@ impl<'a> Problem<'a> {
                 problem.recentre()?;
             }
             if clean && round > 0 {
+                problem.reference.attack = problem.find_attack()?;
                 problem.scatter();
                 problem.rebuild(Changed::Scatter)?;
             }

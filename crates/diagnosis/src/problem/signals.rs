@@ -54,6 +54,15 @@ impl Signals {
         Arc::new(Self::new(self.group, self.residual, self.raw.clone()))
     }
 
+    /// What it changes by to `other` per `scale`, as a sensitivity.
+    pub(super) fn change_to(&self, other: &Self, scale: f64) -> Arc<Self> {
+        let of = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            a.iter().zip(b).map(|(a, b)| (b - a) / scale).collect()
+        };
+        let raw = self.raw.iter().zip(other.raw.iter()).map(of).collect();
+        Arc::new(Self::new(self.group, false, Arc::new(raw)))
+    }
+
     fn samples(&self) -> usize {
         self.raw.iter().map(Vec::len).sum()
     }

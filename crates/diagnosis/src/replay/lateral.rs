@@ -120,9 +120,11 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
         -model.trailer_mass_kg * bank_m_s2,
     );
     let share = plant.truck.resistance.side_force_tractor_frac
+        + t[P::SideShare as usize]
         + t[P::WindShare as usize]
         + t[P::CrosswindShare as usize];
     let behind_m = plant.truck.resistance.side_force_trailer_behind_cg_m
+        + t[P::SideBehind as usize]
         + t[P::WindBehind as usize]
         + t[P::CrosswindBehind as usize];
     let trailer = plus(&system.trailer, &system.trailer_moment, -behind_m);

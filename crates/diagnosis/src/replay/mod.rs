@@ -233,6 +233,8 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::CrosswindShare
         | P::WindBehind
         | P::CrosswindBehind
+        | P::SideShare
+        | P::SideBehind
         | P::Bank
         | P::AccelYBias
         | P::TrailerYawBias => &[G::Lateral],
@@ -296,4 +298,4 @@ pub(crate) fn replay_group(
 #[cfg(test)]
 mod invariance;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

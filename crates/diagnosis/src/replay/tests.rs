@@ -8,7 +8,7 @@ use crate::Drive;
 
 /// Twelve minutes of a truck: climbs that heat the coolant until the fan runs, descents on the
 /// retarder, curves; recorded without noise.
-fn recorded(truck: &TruckParameters, payload_kg: f64) -> Drive {
+pub(crate) fn recorded(truck: &TruckParameters, payload_kg: f64) -> Drive {
     let model = TruckModel::new(truck.clone(), payload_kg).unwrap();
     let n = 12 * 60 * 20;
     let mut s = model.initial_state(0.0, 0.0, 0.0, 18.0);
