@@ -1,13 +1,14 @@
 //! Calibrates one population to a part of the recordings and judges it on the others, then the
 //! other way round: every recording is judged by drivers who were found without it.
 //!
-//! `cross_validate GENERATIONS PARTS FILE:LANES...` deals the files out to so many parts in turn
-//! (1: learn from all, and judge on the same) and prints a line per recording: Kolmogorov-Smirnov
-//! distances of speed and gap with the measured start and arrivals (`bounded`), that of the speeds
-//! if everyone kept the speed that they came with (`kept`), those of speed and gap with flow and
-//! speeds at both ends only (`free`: eight seeds together, as bounded traffic is four; `alone`: mean
-//! and range of single seeds; `among`: mean distance of the seeds from each other), and the mean
-//! distance of the speeds from the other recordings of its name up to the first digit (`others`).
+//! `cross_validate GENERATIONS[:SEED] PARTS FILE:LANES...` deals the files out to so many parts in
+//! turn (1: learn from all, and judge on the same), searches with that seed (1) and prints a line per
+//! recording: Kolmogorov-Smirnov distances of speed and gap with the measured start and arrivals
+//! (`bounded`), that of the speeds if everyone kept the speed that they came with (`kept`), those of
+//! speed and gap with flow and speeds at both ends only (`free`: eight seeds together, as bounded
+//! traffic is four; `alone`: mean and range of single seeds; `among`: mean distance of the seeds from
+//! each other), and the mean distance of the speeds from the other recordings of its name up to the
+//! first digit (`others`).
 #![allow(clippy::disallowed_macros, reason = "a measurement program")]
 
 use std::error::Error;
@@ -117,17 +118,19 @@ fn judge(one: &Looked, all: &[Looked], found: &Calibration) -> Result<Verdict, B
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [generations, parts, files @ ..] = arguments.as_slice() else {
-        return Err("usage: cross_validate GENERATIONS PARTS FILE:LANES...".into());
+        return Err("usage: cross_validate GENERATIONS[:SEED] PARTS FILE:LANES...".into());
     };
+    let (generations, seed) = generations.split_once(':').unwrap_or((generations, "1"));
     let (generations, parts): (usize, usize) = (generations.parse()?, parts.parse()?);
+    let seed: u64 = seed.parse()?;
     let all = files.iter().map(|f| Looked::at(f)).collect::<Result<Vec<_>, _>>()?;
     let (mut bounded_met, mut free_met, mut sums) = (0, 0, [0.0; 6]);
     for part in 0..parts {
         let is_out = |k: usize| k % parts == part;
         let learned = all.iter().enumerate().filter(|(k, _)| parts == 1 || !is_out(*k));
         let lessons: Vec<Lesson<'_>> = learned.map(|(_, l)| l.lesson()).collect();
-        let effort = Effort { generations, seed: 1, ..Effort::default() };
-        let base = TrafficConfig { seed: 1000, ..TrafficConfig::default() };
+        let effort = Effort { generations, seed, ..Effort::default() };
+        let base = TrafficConfig { seed: 1000 * seed, ..TrafficConfig::default() };
         let found = calibrate(&lessons, &base, effort)?;
         println!("part {part}: {} trials, distance {:.3}", found.trials, found.distance);
         for (key, x, (low, high)) in found.population.iter().chain(&found.free) {

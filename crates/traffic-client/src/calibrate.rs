@@ -9,8 +9,10 @@
 //!    drivers stand where they would have to creep (`human.creep_m_s`), as measured ones do;
 //! 2. how the drivers of *free* traffic follow, and its *rim*: it gets flow, density, classes and
 //!    mean and standard deviation of the speeds at both ends of each recording, and four numbers,
-//!    the same for all recordings, say how these become a boundary. Bounded traffic is told where a
-//!    jam is, free traffic has to make it: with one set of drivers for both, both get worse.
+//!    the same for all recordings, say how these become a boundary. Flow over density is the mean
+//!    speed: where it is less than at the ends, the stretch begins with a queue. Bounded traffic is
+//!    told where a jam is, free traffic has to make it: with one set of drivers for both, both get
+//!    worse.
 //!
 //! The measure is the mean over the recordings of a weighted sum of Kolmogorov-Smirnov distances,
 //! each weighing as much as it lasts, and a little for values that no calibration has found before

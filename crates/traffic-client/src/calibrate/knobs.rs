@@ -22,6 +22,11 @@ pub(super) struct Knob {
 /// forget a jam that the stretch began with and that neither end shows.
 const WARM_UP_S: f64 = 20.0;
 
+/// Of the speed that vehicles on the stretch lack of that at both ends, on average, so much is made
+/// up of those that stand, and the rest of those that brake and pull away. All of it leaves too many
+/// standing.
+const STANDS_FRAC: f64 = 0.7;
+
 /// Slowest speed of these drivers behind another one, m/s: that of a car in first gear at idle, about
 /// 5 km/h. With 1 or 2 m/s held-back recordings are nearly as close; creeping, they are not.
 const CREEP_M_S: f64 = 1.5;
@@ -133,6 +138,11 @@ pub(super) fn with_population(
     config
 }
 
+/// Part of the vehicles that stand in a stretch with this mean speed between ends where they move on.
+fn standing_frac(mean_m_s: f64, moving_m_s: f64) -> f64 {
+    (STANDS_FRAC * (1.0 - mean_m_s / moving_m_s)).clamp(0.0, 0.9)
+}
+
 /// Inflow, density, classes, lengths, and the speeds at both ends as measured: all that a detector
 /// before and one behind the stretch know.
 pub(super) fn with_measured_demand(
@@ -165,14 +175,20 @@ pub(super) fn with_measured_demand(
             own.length_spread_m = (1.7 * m.sigma).min(0.4 * own.length_m);
         }
     }
-    let about = |speeds: Vec<f64>| moments(&speeds);
-    if let Some(before) = about(boundary.inflow_m_s().collect()) {
+    let before = moments(&boundary.inflow_m_s().collect::<Vec<_>>());
+    let beyond = moments(&boundary.outflow_m_s().collect::<Vec<_>>());
+    if let Some(before) = before {
         config.inflow_speed_m_s = Some(before.mean.max(1.0));
         config.inflow_sigma_m_s = before.sigma.min(30.0);
     }
-    if let Some(beyond) = about(boundary.outflow_m_s().collect()) {
+    if let Some(beyond) = beyond {
         config.outflow_speed_m_s = Some(beyond.mean.max(0.0));
         config.outflow_sigma_m_s = beyond.sigma.min(30.0);
+    }
+    if let (Some(before), Some(beyond)) = (before, beyond) {
+        let mean_m_s = 1000.0 * flow_1_s / measured.density_1_km(lanes_m).max(1e-9);
+        config.initial_standing_frac =
+            standing_frac(mean_m_s, 0.5 * (before.mean + beyond.mean).max(1.0));
     }
     config
 }
@@ -198,6 +214,12 @@ pub(super) fn with_free(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn some_stand_where_a_stretch_is_slower_than_both_of_its_ends() {
+        assert!((standing_frac(6.0, 10.0) - 0.28).abs() < 1e-12);
+        assert_eq!(standing_frac(14.0, 12.0), 0.0);
+    }
 
     #[test]
     fn every_corner_of_the_search_is_a_valid_configuration() {

@@ -6,8 +6,9 @@
 //! Record 2316 (2012) 47): the nearer their end comes, the shorter gaps and the harder braking are
 //! accepted; who has to change adapts to the new leader ahead of time (synchronization), the new
 //! follower lets one in (cooperation), and both go back to their own headways slowly (relaxation).
-//! Who takes longer to change begins as much earlier: trucks that need the room of three cars would
-//! else get it where everybody else merges, and hold up the whole queue.
+//! Who takes longer to change begins as much earlier, each driver by his own time: trucks that need
+//! the room of three cars would else get it where everybody else merges, and cars would all merge at
+//! one metre, where each stops those behind; either holds up the whole queue.
 
 use driver_models::{Change, Mobil};
 use tractrix_core::VehicleClass;
@@ -75,7 +76,7 @@ impl Engine {
             return None;
         }
         let here = &self.map.lanes[lane as usize];
-        let ahead = self.ahead_m(fleet.driver[i].class);
+        let ahead = self.ahead_m(fleet.driver[i].lane_change_s);
         if exit != NO_LANE && lane != exit {
             let out = &self.map.lanes[exit as usize];
             if s < out.s_end_m && s > out.s_start_m - ahead {
@@ -101,20 +102,20 @@ impl Engine {
         self.minds.least_frac(self.state.fleet.driver[i].idm.headway_s)
     }
 
-    /// How many times as far ahead as cars this class begins to think of a needed change: as many
-    /// times as the change takes, and no less.
-    pub(super) fn ahead_frac(&self, class: VehicleClass) -> f64 {
-        (self.config.class(class).lane_change_s / self.config.car.lane_change_s).max(1.0)
+    /// How many times as far ahead as the mean car somebody whose changes take `lane_change_s` begins
+    /// to think of a needed one: as many times as long as it takes, and no less.
+    pub(super) fn ahead_frac(&self, lane_change_s: f64) -> f64 {
+        (lane_change_s / self.config.car.lane_change_s).max(1.0)
     }
 
-    fn ahead_m(&self, class: VehicleClass) -> f64 {
-        self.config.mandatory_ahead_m * self.ahead_frac(class)
+    fn ahead_m(&self, lane_change_s: f64) -> f64 {
+        self.config.mandatory_ahead_m * self.ahead_frac(lane_change_s)
     }
 
     /// How much a change is needed, 0 to 1: it grows from where drivers begin to think of it to the
     /// point where it must be done (LMRS, Eq. 4, by distance).
-    fn desire(&self, class: VehicleClass, distance_m: f64) -> f64 {
-        (1.0 - distance_m / self.ahead_m(class)).clamp(0.0, 1.0)
+    fn desire(&self, lane_change_s: f64, distance_m: f64) -> f64 {
+        (1.0 - distance_m / self.ahead_m(lane_change_s)).clamp(0.0, 1.0)
     }
 
     /// Part of their gap that drivers are content with at a desire (LMRS, Eq. 7).
@@ -131,7 +132,7 @@ impl Engine {
             return;
         }
         let Some(need) = self.need(i) else { return };
-        let desire = self.desire(fleet.driver[i].class, need.distance_m);
+        let desire = self.desire(fleet.driver[i].lane_change_s, need.distance_m);
         if desire < COOPERATES {
             return;
         }
@@ -161,7 +162,7 @@ impl Engine {
             lane != NO_LANE && self.map.is_open_to(lane, NO_LANE) && !self.map.ends_early(lane)
         };
         let lane = [left, right].into_iter().find(goes_on)?;
-        let desire = self.desire(VehicleClass::Truck, distance_m);
+        let desire = self.desire(self.config.truck.lane_change_s, distance_m);
         let needed = desire >= COOPERATES && self.ego.in_lane(lane).is_none();
         needed.then_some(EgoNeed { lane, rear_m: span.rear_m, front_m: span.front_m })
     }
@@ -216,7 +217,7 @@ impl Engine {
         }
         let options = match self.need(i) {
             Some(need) => {
-                let desire = self.desire(fleet.driver[i].class, need.distance_m);
+                let desire = self.desire(fleet.driver[i].lane_change_s, need.distance_m);
                 let possible = self.change_m_s2(i, need.side, Some(desire));
                 [possible.map(|(lane, _)| (need.side, lane, f64::INFINITY)), None]
             }
@@ -301,7 +302,7 @@ impl Engine {
         let to = &self.map.lanes[lane as usize];
         if desire.is_none()
             && self.map.ends_early(lane)
-            && to.s_end_m - s < self.ahead_m(fleet.driver[i].class)
+            && to.s_end_m - s < self.ahead_m(fleet.driver[i].lane_change_s)
         {
             return None;
         }

@@ -83,6 +83,9 @@ pub struct TrafficConfig {
     pub ramp_spawn_probability: f64,
     /// Vehicles per km and lane at the start; `None`: the density of the inflow at `max_speed_m_s`.
     pub initial_density_1_km: Option<f64>,
+    /// Part of the vehicles of that start that stand in a queue, which lies anywhere on the road, in
+    /// all lanes alike.
+    pub initial_standing_frac: f64,
     /// Maximum speed of the traffic, m/s.
     pub max_speed_m_s: f64,
     /// Share of trucks.
@@ -103,7 +106,7 @@ pub struct TrafficConfig {
     /// the USA have left-lane restrictions for trucks of the same kind).
     pub trucks_keep_out_of_left_lane: bool,
     /// Where a lane ends or an exit comes, drivers begin to change lanes this far before, m; those
-    /// of a class whose changes take longer than a car's (`lane_change_s`), as many times as far.
+    /// whose changes take longer than the mean car's (`lane_change_s`), as many times as far.
     pub mandatory_ahead_m: f64,
     /// Braking that a driver accepts to let another one merge, m/s².
     pub yield_decel_m_s2: f64,
@@ -199,6 +202,7 @@ impl Default for TrafficConfig {
             spawn_interval_s: 0.1,
             ramp_spawn_probability: 0.005,
             initial_density_1_km: None,
+            initial_standing_frac: 0.0,
             max_speed_m_s: 15.0,
             truck_share_frac: 0.2,
             van_share_frac: 0.1,
@@ -301,6 +305,7 @@ impl TrafficConfig {
             ("spawn_interval_s", self.spawn_interval_s, 0.1, 3600.0),
             ("ramp_spawn_probability", self.ramp_spawn_probability, 0.0, 1.0),
             ("initial_density_1_km", self.initial_density_1_km.unwrap_or(0.0), 0.0, 140.0),
+            ("initial_standing_frac", self.initial_standing_frac, 0.0, 0.9),
             ("max_speed_m_s", self.max_speed_m_s, 1.0, 70.0),
             ("truck_share_frac", self.truck_share_frac, 0.0, 1.0),
             (

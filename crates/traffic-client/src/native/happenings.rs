@@ -222,7 +222,7 @@ impl Engine {
     /// The nearest stretch in the way ahead in a lane, of which driver `i` knows.
     pub(super) fn block_ahead(&self, i: usize, lane: u16) -> Option<&Block> {
         let s_m = self.state.fleet.s_m[i];
-        let frac = self.ahead_frac(self.state.fleet.driver[i].class);
+        let frac = self.ahead_frac(self.state.fleet.driver[i].lane_change_s);
         // Barriers are announced; a vehicle that stands is seen.
         let ahead_m = |b: &Block| if b.is_closed { b.ahead_m * frac } else { b.ahead_m };
         let known = |b: &&Block| b.lane == lane && s_m < b.to_m && s_m > b.from_m - ahead_m(b);

@@ -1,22 +1,12 @@
-//! Where vehicles come from: the first fill of the road, and arrivals at the entries.
+//! Where vehicles come from: arrivals at the entries.
 
 use tractrix_core::VehicleClass;
 
 use super::driver::Driver;
 use super::engine::{Engine, TICK_S};
 use super::equilibrium::{easy_speed_m_s, is_critical_speed};
-use super::fleet::Fleet;
 use super::lanes::LaneUse;
 use crate::philox::{Draws, Stream};
-
-/// A vehicle of the first fill.
-struct Start {
-    s_m: f64,
-    v_m_s: f64,
-    lane: u16,
-    id: u64,
-    driver: Driver,
-}
 
 impl Engine {
     /// Off-ramps that begin after a station, nearest first.
@@ -25,7 +15,7 @@ impl Engine {
         exits.filter(move |&k| self.map.lanes[k as usize].s_start_m > s_m)
     }
 
-    fn draw(&self, id: u64, s_m: f64, lane: u16) -> Driver {
+    pub(super) fn draw(&self, id: u64, s_m: f64, lane: u16) -> Driver {
         let share = self.config.schedule.at(self.time_s(), None, |step| step.truck_share_frac);
         let share = share.unwrap_or(self.config.truck_share_frac);
         let share = self.truck_share_of_lane(share, s_m, lane);
@@ -49,50 +39,6 @@ impl Engine {
         let open = through().filter(|&k| !self.is_closed_to(k, VehicleClass::Truck)).count();
         let is_through = through().any(|k| k == lane);
         if is_through { (share * through().count() as f64 / open as f64).min(1.0) } else { share }
-    }
-
-    /// Fills the through lanes with the configured density. Spacings vary by a factor; where they
-    /// are short, speeds are those of the driver's own headway, so nobody starts in an emergency.
-    pub(crate) fn fill(&mut self) {
-        let density = self.config.start_density_1_km();
-        if density <= 0.0 {
-            return;
-        }
-        let mut starts = Vec::new();
-        for (k, lane) in self.map.lanes.iter().enumerate() {
-            if lane.usage != LaneUse::Through {
-                continue;
-            }
-            let mut front_m = lane.s_end_m - 1.0;
-            let mut ahead: Option<(f64, f64)> = None;
-            for position in 0u64.. {
-                let id = self.state.next_id;
-                let driver = self.draw(id, front_m, k as u16);
-                let draws = Draws::new(self.config.seed, Stream::Fill, position);
-                let spacing = (0.3 + 1.4 * draws.uniform(k as u32)) * 1000.0 / density;
-                let desired =
-                    driver.idm.desired_speed_m_s.min(lane.limit_m_s(front_m) * driver.limit_factor);
-                let mut v_m_s = desired;
-                if let Some((rear_m, speed_m_s)) = ahead {
-                    front_m = rear_m - (spacing - driver.length_m).max(1.5 * driver.idm.min_gap_m);
-                    let gap = rear_m - front_m;
-                    let own = (gap - driver.idm.min_gap_m) / driver.idm.headway_s;
-                    v_m_s = desired.min(own).min(speed_m_s + 0.1 * gap);
-                }
-                let rear_m = front_m - driver.length_m;
-                if rear_m < lane.s_start_m {
-                    break;
-                }
-                ahead = Some((rear_m, v_m_s));
-                starts.push(Start { s_m: front_m, v_m_s, lane: k as u16, id, driver });
-                self.state.next_id += 1;
-            }
-        }
-        starts.sort_by(|a, b| a.s_m.total_cmp(&b.s_m));
-        self.state.fleet = Fleet::default();
-        for x in starts {
-            self.state.fleet.insert(x.s_m, x.v_m_s, x.lane, x.id, x.driver);
-        }
     }
 
     /// Draws the arrivals of the last `ticks` and lets in whom the traffic has room for.

@@ -9,6 +9,7 @@ mod driver;
 mod ego;
 mod engine;
 mod equilibrium;
+mod fill;
 mod fleet;
 mod from_road;
 mod happenings;

@@ -226,10 +226,34 @@ fn a_queue_before_an_on_ramp_is_served_nearly_as_fast_as_the_flat_road() {
 fn a_queue_with_trucks_before_a_lane_drop_is_served_nearly_as_fast_as_the_flat_road() {
     // The story: trucks zipped where cars did, at the head of the queue. Each needed the room of
     // three cars there and pulled away slowly, and 17 to 20 % of the capacity was lost. Farther back
-    // their gaps close again before the head: 9 % over twelve seeds, of which these are three.
-    let flat = mean_served_1_h(&demand(0.2, 2400.0), &flat(), 3500.0);
-    let drop = mean_served_1_h(&demand(0.2, 1900.0), &lane_drop(30.0), 4000.0);
-    assert!(drop > 0.88 * flat, "{drop} of {flat} per hour and lane");
+    // their gaps close again before the head: 7 % over twelve seeds, of which these are three. Few
+    // trucks made it no better (11 %) while all cars zipped at one metre: now 4 %.
+    for (trucks, least_frac) in [(0.1, 0.93), (0.2, 0.9)] {
+        let flat = mean_served_1_h(&demand(trucks, 2400.0), &flat(), 3500.0);
+        let drop = mean_served_1_h(&demand(trucks, 1900.0), &lane_drop(30.0), 4000.0);
+        assert!(drop > least_frac * flat, "{trucks}: {drop} of {flat} per hour and lane");
+    }
+}
+
+#[test]
+fn who_takes_longer_to_change_lanes_leaves_one_that_ends_earlier() {
+    let left_at_m = |lane_change_s: f64| {
+        let config = TrafficConfig { spawn_probability: 0.0, ..demand(0.0, 0.0) };
+        let mut e = engine(config, lane_drop(30.0));
+        let mut driver = Driver::draw(&e.config, 0.0, 1, std::iter::empty());
+        driver.lane_change_s = lane_change_s;
+        e.state.fleet.insert(1500.0, 25.0, 2, 1, driver);
+        while !e.state.fleet.is_changing(0) {
+            e.decide();
+            e.commit();
+        }
+        3000.0 - e.state.fleet.s_m[0]
+    };
+    // A decision every 0.5 s, at up to 33 m/s.
+    for (lane_change_s, ahead_m) in [(3.0, 800.0), (4.0, 800.0), (5.0, 1000.0), (6.0, 1200.0)] {
+        let at_m = left_at_m(lane_change_s);
+        assert!((ahead_m - 20.0..=ahead_m).contains(&at_m), "{lane_change_s} s: {at_m} m");
+    }
 }
 
 #[test]
