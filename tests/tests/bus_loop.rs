@@ -1,4 +1,10 @@
 //! The closed loop over a bus: the same drive as directly, and what it makes of faults.
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_macros,
+    reason = "a test may fail, and prints figures"
+)]
 
 use j1939::BitRate;
 use j1939::bus::Bus;

@@ -15,7 +15,7 @@
 mod calibration;
 #[path = "real_data/plot.rs"]
 mod plot;
-#[allow(dead_code, reason = "each user of the generator needs a part of it")]
+#[allow(dead_code, clippy::unwrap_used, reason = "each user of the generator needs a part of it")]
 #[path = "../tests/support/mod.rs"]
 mod support;
 #[path = "campaign/truth.rs"]

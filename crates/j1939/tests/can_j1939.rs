@@ -1,6 +1,13 @@
 //! Against can-j1939, the J1939 stack of Python: over TCP everywhere, over the kernel's CAN sockets
 //! in User-Mode Linux. `./test` runs both with the Python that has the peer in `CAN_PYTHON`.
 #![cfg(target_os = "linux")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    reason = "a test waits"
+)]
 
 mod wall;
 

@@ -3,6 +3,7 @@
 //! They need `vcan0` and `vcan1` (CAN FD), the kernel's `can-j1939` and can-utils:
 //! `tests/can/uml.sh` runs them in User-Mode Linux. Every wait is for an event, with a bound.
 #![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::disallowed_methods, reason = "a test waits")]
 
 mod wall;
 

@@ -1,4 +1,5 @@
 //! Time of the queries that run in every tick.
+#![allow(missing_docs, reason = "criterion's macros")]
 
 use std::hint::black_box;
 

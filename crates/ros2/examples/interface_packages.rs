@@ -1,5 +1,6 @@
 //! Writes the ROS interface packages that no Python wheel brings, for peers to build:
 //! `cargo run --release -p ros2 --example interface_packages -- DIR`.
+#![allow(clippy::disallowed_macros, reason = "a program prints")]
 
 use std::path::Path;
 

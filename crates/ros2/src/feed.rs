@@ -138,6 +138,7 @@ pub(crate) fn clock_ns(message: &TopicMessage) -> Option<i64> {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_methods, reason = "an instant to count from")]
 mod tests {
     use super::*;
 

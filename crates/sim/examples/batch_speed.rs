@@ -1,7 +1,11 @@
 //! Steps of environments per CPU second on one thread.
 //!
 //! `cargo run --release -p sim --example batch_speed -- [SCENARIO] [kinematic|truck] [ENVIRONMENTS] [DECISIONS] [AWAKE_M]`
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program that measures may stop")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_macros,
+    reason = "a program that measures may stop"
+)]
 
 use rustix::time::{ClockId, clock_gettime};
 use sim::Scenario;

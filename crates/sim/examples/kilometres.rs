@@ -5,7 +5,7 @@
 //! scenario with every decider, seed after seed, until the kilometres are full, and prints one row
 //! per scenario and decider; `--json` writes the same. A collision's scenario, decider, seed and
 //! time are printed as it happens.
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, missing_docs)]
 #![expect(clippy::disallowed_macros, reason = "an example prints")]
 
 use std::fmt::Write as _;

@@ -4,7 +4,7 @@
 //!
 //! `cargo run --release -p sim --example speed_plan -- SCENARIO [KM] [--truck NAME] [--payload-kg KG]
 //! [--only-predictive] [--no-eco-roll] [--no-gears] [--trace] [--trace-cruise]`
-#![allow(clippy::unwrap_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::disallowed_macros, missing_docs)]
 
 use planner::SpeedPlannerKind;
 use planner::pcc::model::profile_of;

@@ -1,5 +1,6 @@
 //! A step of a kinematic environment, and keeping a state and going back to it, ask for no memory
 //! once the first steps have.
+#![allow(clippy::unwrap_used, reason = "a test may fail")]
 
 #[path = "support/arrays.rs"]
 mod arrays;

@@ -8,6 +8,7 @@
 //! Record 2088 (2008) 148, Eq. 8). On stdout: tables of Markdown.
 #![allow(
     clippy::print_stdout,
+    clippy::panic,
     clippy::disallowed_macros,
     clippy::unwrap_used,
     reason = "an example"

@@ -1,5 +1,6 @@
 //! What the firmware for a Cortex-M4 computes, on this computer. `./test` compares the bits that it
 //! prints here, on AArch64 and on the Cortex-M4.
+#![allow(clippy::disallowed_macros, reason = "the bits are printed")]
 
 #[path = "../../j1939/tests/vectors/mod.rs"]
 mod vectors;

@@ -1,6 +1,12 @@
 //! The virtual truck and the program that drives it: two processes, a bus between them, real time.
 #![cfg(target_os = "linux")]
-#![allow(clippy::unwrap_used, clippy::panic, clippy::disallowed_methods, reason = "a test waits")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::disallowed_methods,
+    clippy::disallowed_macros,
+    reason = "a test waits, and prints figures"
+)]
 
 mod support;
 

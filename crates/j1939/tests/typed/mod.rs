@@ -1,5 +1,11 @@
 //! Frames of a log, and what a program does with each: it finds the type of the group and decodes.
-#![allow(unreachable_pub, clippy::unwrap_used, clippy::panic, reason = "helpers of tests")]
+#![allow(
+    dead_code,
+    unreachable_pub,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests"
+)]
 
 use std::hint::black_box;
 use std::io::BufReader;

@@ -1,5 +1,6 @@
 //! An allocator that counts the requests of each thread.
 #![expect(unsafe_code, reason = "an allocator cannot be written without")]
+#![allow(unreachable_pub, reason = "tests of three crates share it")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;

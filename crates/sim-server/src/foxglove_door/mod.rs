@@ -65,6 +65,7 @@ impl Door {
     /// [`Failure::Input`]: the port is taken.
     pub(crate) fn open(port: u16) -> Result<Self, Failure> {
         refusals::log();
+        #[expect(clippy::disallowed_methods, reason = "the shell owns its sockets")]
         let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port));
         let listener = listener.map_err(|e| unusable(port, &e))?;
         listener.set_nonblocking(true).map_err(|e| unusable(port, &e))?;

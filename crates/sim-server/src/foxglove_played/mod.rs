@@ -121,6 +121,7 @@ impl Deck {
         while !stop.load(Ordering::Relaxed) {
             let seek = self.lock().seek.take();
             if let Some(to) = seek {
+                #[expect(clippy::disallowed_methods, reason = "viewers live in wall time")]
                 std::thread::sleep(SETTLE);
                 let seen = player.seek(to)?;
                 next = player.next_message()?;

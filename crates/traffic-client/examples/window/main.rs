@@ -1,7 +1,11 @@
 //! How far traffic with a window is that of the whole road.
 //!
 //! `cargo run --release -p traffic-client --example window -- [SEEDS] [SECONDS] [FAMILY] [AWAKE_M]`
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a program that measures may stop")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::disallowed_macros,
+    reason = "a program that measures may stop"
+)]
 
 mod measure;
 

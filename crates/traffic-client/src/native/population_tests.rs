@@ -1,4 +1,5 @@
 //! What the drivers make of traffic as a whole, against what is measured on roads.
+#![allow(clippy::disallowed_macros, reason = "the figures are printed")]
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
