@@ -2,6 +2,7 @@
 //! does not see the parameters of the others, so what has been replayed once serves wherever only
 //! those of other groups have moved.
 
+use core::ops::Range;
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -18,6 +19,8 @@ pub(super) struct Signals {
     /// Per module of the group; empty where it is not available.
     raw: Arc<Vec<Vec<f64>>>,
     whitened: OnceLock<Vec<Vec<f64>>>,
+    /// Per module, where the whitened rows are not zero: a hat over time is so in a part of a drive.
+    reach: OnceLock<Vec<Range<usize>>>,
     /// Inner products with the sensitivities to the drive's tolerances.
     products: OnceLock<Vec<f64>>,
 }
@@ -46,7 +49,14 @@ const CLIP: f64 = 1e3;
 
 impl Signals {
     fn new(group: Group, residual: bool, raw: Arc<Vec<Vec<f64>>>) -> Self {
-        Self { group, residual, raw, whitened: OnceLock::new(), products: OnceLock::new() }
+        Self {
+            group,
+            residual,
+            raw,
+            whitened: OnceLock::new(),
+            reach: OnceLock::new(),
+            products: OnceLock::new(),
+        }
     }
 
     /// The same, to be whitened again.
@@ -249,12 +259,32 @@ impl Problem<'_> {
         out
     }
 
+    /// Where whitened signals are not zero, per module of the group; by whole eights of rows, so that
+    /// sums of products have the bits that they have over all rows.
+    fn reach<'s>(&self, i: usize, signals: &'s Signals) -> &'s [Range<usize>] {
+        let of = |rows: &Vec<f64>| {
+            let acts = |x: &f64| *x != 0.0;
+            let from = rows.iter().position(acts).unwrap_or(rows.len());
+            let to = rows.iter().rposition(acts).map_or(0, |last| last + 1);
+            from - from % 8..to.next_multiple_of(8).min(rows.len())
+        };
+        signals.reach.get_or_init(|| self.white(i, signals).iter().map(of).collect())
+    }
+
     /// Inner product of two lines.
     pub(super) fn dot(&self, i: usize, a: &Line, b: &Line) -> f64 {
+        let product =
+            |((x, y), (p, q)): ((&Vec<f64>, &Vec<f64>), (&Range<usize>, &Range<usize>))| {
+                let both = p.start.max(q.start)..p.end.min(q.end);
+                if both.is_empty() { 0.0 } else { inner(&x[both.clone()], &y[both]) }
+            };
         a.iter()
             .flat_map(|a| b.iter().filter(|b| b.group == a.group).map(move |b| (a, b)))
-            .flat_map(|(a, b)| self.white(i, a).iter().zip(self.white(i, b)))
-            .map(|(a, b)| inner(a, b))
+            .flat_map(|(a, b)| {
+                let rows = self.white(i, a).iter().zip(self.white(i, b));
+                rows.zip(self.reach(i, a).iter().zip(self.reach(i, b)))
+            })
+            .map(product)
             .sum()
     }
 
