@@ -20,6 +20,10 @@ use super::{Shared, gate, problem};
 use crate::provenance::{GIT_REVISION, SCHEMA, VERSION};
 use crate::session::{self, Acted, Command, DEFAULT, Handle, Refused, Wish};
 
+/// How long a question for the state waits for the first frame: frames are made beside the run, and on
+/// a loaded machine commands are answered before one is there.
+const FIRST_FRAME: Duration = Duration::from_secs(2);
+
 pub(super) fn json(status: StatusCode, body: String) -> Response {
     (status, [(header::CONTENT_TYPE, "application/json")], body).into_response()
 }
@@ -27,8 +31,12 @@ pub(super) fn json(status: StatusCode, body: String) -> Response {
 /// The latest frame.
 #[utoipa::path(get, path = "/state", params(("session" = String, Path, description = "Id of a session; `run` has `default`")), responses((status = 200, body = FrameObject)))]
 pub(super) async fn state(Of(shared): Of) -> Response {
-    let frame = Arc::clone(&shared.frame.borrow().json);
-    if frame.is_empty() { problem::no_tick_yet() } else { json(StatusCode::OK, frame.to_string()) }
+    let mut frames = shared.frame.subscribe();
+    let first = frames.wait_for(|frame| !frame.json.is_empty());
+    match tokio::time::timeout(FIRST_FRAME, first).await {
+        Ok(Ok(frame)) => json(StatusCode::OK, frame.json.to_string()),
+        Ok(Err(_)) | Err(_) => problem::no_tick_yet(),
+    }
 }
 
 /// Says that the server can be used: the run that it was started with, if it was, has begun.
