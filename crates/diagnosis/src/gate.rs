@@ -3,16 +3,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::course::{Course, weather};
 use crate::decisions::{
     DISPERSION_PRIOR, LONELY, MIN_SIGMAS, OWN_SIZES, OWN_SIZES_PART, PRIOR_CAUSE, SHARED,
     STRONG_NATS, WORTH,
 };
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
-use crate::param::P;
 use crate::problem::Direction;
-use crate::refit::{Fit, Prior, prior};
+use crate::refit::{Fit, prior};
 use crate::stats::evidence;
 use crate::weights::log_odds;
 
@@ -126,7 +124,7 @@ impl dyn Evidence + '_ {
             let doubtful = (0..fit.set.len()).filter(|i| {
                 let hyp = &CATALOGUE[fit.set[*i]];
                 let size = hyp.size(&fit.theta, self.zero()).abs();
-                let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, *i);
+                let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, *i, nats[*i]);
                 let one = |f: &Fit| hyp.nonlinear() && Self::from_one_drive(&fit, *i, f);
                 let of_one_drive = fewer[*i].as_ref().is_none_or(one);
                 // The set without it is more probable (the median probability model: Barbieri and
@@ -159,32 +157,15 @@ impl dyn Evidence + '_ {
         })
     }
 
-    /// A size of the `i`-th member is beyond what the drives disagree about. Its own course, which
-    /// vanishes with it, is no reason that it might be nothing. Drives do disagree about weather, as its
-    /// course says, and it may blow harder or push further forward: it stands out also once its course
-    /// has taken what it can, and forms stay where they are, with them a size of nothing is no effect.
-    fn stands_out(&self, fit: &Fit, member: usize) -> bool {
-        let hyp = &CATALOGUE[fit.set[member]];
-        let (own, sizes) = (hyp.sizes, fit.sizes());
-        let asked = |j: &usize| !weather(hyp) || sizes.contains(&fit.free[*j]);
-        let of: Vec<usize> = (0..fit.free.len()).filter(asked).collect();
-        let keep: Vec<usize> = core::iter::once(0).chain(of.iter().map(|j| j + 1)).collect();
-        let free: Vec<P> = of.iter().map(|j| fit.free[*j]).collect();
-        let priors: Vec<Prior> = of.iter().map(|j| fit.priors[*j]).collect();
-        let sigma: Vec<f64> = priors.iter().map(|p| p.sigma).collect();
-        let beyond = |course: &Course| -> Option<bool> {
-            let gram = course.taken_out(&fit.whole, &keep, &fit.theta, self.zero())?;
-            let (covariance, _) = evidence::posterior(&gram.total().0, &sigma)?;
-            let (free, priors) = (free.clone(), priors.clone());
-            let of_sizes = Fit { free, priors, gram, covariance, ..fit.clone() };
-            let variances = self.variances(&of_sizes);
-            Some(of_sizes.free.iter().zip(&variances).any(|(p, v)| {
-                let x = fit.theta[*p as usize] - self.zero()[*p as usize];
-                own.contains(p) && x.abs() > MIN_SIGMAS * v.sqrt()
-            }))
-        };
-        beyond(&fit.course.without(own)).unwrap_or(false)
-            || weather(hyp) && beyond(&fit.course).unwrap_or(false)
+    /// What the `i`-th member adds is beyond what the drives disagree about: `nats` of evidence, over the
+    /// over-dispersion of the drives about its sizes, are more than [`MIN_SIGMAS`]. Its size over its
+    /// interval does not say it: that of a fade or of a crosswind is known no better than its form, however
+    /// much the two explain together (Hauck and Donner, J. Am. Stat. Assoc. 72, 1977).
+    fn stands_out(&self, fit: &Fit, member: usize, nats: f64) -> bool {
+        let own = CATALOGUE[fit.set[member]].sizes;
+        let of_sizes = fit.free.iter().zip(self.dispersions(fit));
+        let over = of_sizes.filter(|(p, _)| own.contains(p)).map(|(_, phi)| phi);
+        2.0 * nats > MIN_SIGMAS * MIN_SIGMAS * over.fold(0.0, f64::max)
     }
 
     /// Gain of the `i`-th member on unseen halves of the drives, nats. Its own course is not taken
