@@ -273,18 +273,13 @@ impl Problem<'_> {
 
     /// Inner product of two lines.
     pub(super) fn dot(&self, i: usize, a: &Line, b: &Line) -> f64 {
-        let product =
-            |((x, y), (p, q)): ((&Vec<f64>, &Vec<f64>), (&Range<usize>, &Range<usize>))| {
-                let both = p.start.max(q.start)..p.end.min(q.end);
-                if both.is_empty() { 0.0 } else { inner(&x[both.clone()], &y[both]) }
-            };
         a.iter()
             .flat_map(|a| b.iter().filter(|b| b.group == a.group).map(move |b| (a, b)))
             .flat_map(|(a, b)| {
                 let rows = self.white(i, a).iter().zip(self.white(i, b));
                 rows.zip(self.reach(i, a).iter().zip(self.reach(i, b)))
             })
-            .map(product)
+            .map(|((x, y), (p, q))| inner_where_both_act((x, p), (y, q)))
             .sum()
     }
 
@@ -301,4 +296,10 @@ impl Problem<'_> {
         }
         out
     }
+}
+
+/// Inner product over the rows where both act.
+fn inner_where_both_act(x: (&[f64], &Range<usize>), y: (&[f64], &Range<usize>)) -> f64 {
+    let both = x.1.start.max(y.1.start)..x.1.end.min(y.1.end);
+    if both.is_empty() { 0.0 } else { inner(&x.0[both.clone()], &y.0[both]) }
 }
