@@ -53,7 +53,7 @@ fn rho(h: &Hypothesis, along: &Along) -> f64 {
 }
 
 /// Is a size one of weather?
-pub(crate) fn weather(h: &Hypothesis) -> bool {
+fn weather(h: &Hypothesis) -> bool {
     h.course.iter().any(|along| matches!(along, Along::Weather(_)))
 }
 

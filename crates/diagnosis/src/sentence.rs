@@ -124,6 +124,15 @@ pub(crate) fn with_interval(sentence: String, x: f64, sigma: f64, unit: &str) ->
 pub(crate) const NOT_SURE: &str = " Not sure: it leaves what another cause would explain, or the \
     drives do not agree about its size.";
 
+/// Where the baseline has side winds act.
+pub(crate) fn side_force(tractor_frac: f64, trailer_behind_cg_m: f64, nats: f64) -> String {
+    format!(
+        "In the baseline side winds act with {:.0} % on the tractor and {trailer_behind_cg_m:+.1} m \
+         behind the trailer's CG ({nats:.0} nats), not where the truck file says.",
+        100.0 * tractor_frac
+    )
+}
+
 /// Why two causes look alike, and what would tell them apart.
 pub(crate) fn confusion(a: &str, b: &str, lost_nats: f64) -> String {
     let has = |x: &[&str]| x.contains(&a) && x.contains(&b);

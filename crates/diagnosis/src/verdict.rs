@@ -144,8 +144,10 @@ pub struct Gain {
 }
 
 /// Where the side force of the wind acts on the truck, as the winds of the baseline's days show.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SideForcePoint {
+    /// For people.
+    pub sentence: String,
     /// Part of it on the tractor, 1: `resistance.side_force_tractor_frac`.
     pub tractor_frac: f64,
     /// How far behind its CG the trailer's part acts, m: `resistance.side_force_trailer_behind_cg_m`.

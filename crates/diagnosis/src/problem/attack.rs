@@ -12,7 +12,7 @@ use super::signals::Line;
 use super::{Direction, Problem, Reference, nuisance_directions};
 use crate::decisions::MIN_EVIDENCE;
 use crate::param::{P, Theta};
-use crate::{DiagnosisError, Plant, SideForcePoint};
+use crate::{DiagnosisError, Plant, SideForcePoint, sentence};
 
 /// The tractor's part and how far behind its CG the trailer's part acts, off the truck file's.
 const POINT: [P; 2] = [P::SideShare, P::SideBehind];
@@ -60,10 +60,15 @@ impl Reference {
     /// Where side winds act, if the drives have shown another point than the truck file's.
     pub(crate) fn side_force(&self, plant: &Plant) -> Option<SideForcePoint> {
         let own = &plant.truck.resistance;
-        (self.attack > MIN_EVIDENCE).then(|| SideForcePoint {
-            tractor_frac: own.side_force_tractor_frac + self.theta[POINT[0] as usize],
-            trailer_behind_cg_m: own.side_force_trailer_behind_cg_m + self.theta[POINT[1] as usize],
-            evidence: self.attack,
+        let evidence = self.attack_nats;
+        let tractor_frac = own.side_force_tractor_frac + self.theta[POINT[0] as usize];
+        let trailer_behind_cg_m =
+            own.side_force_trailer_behind_cg_m + self.theta[POINT[1] as usize];
+        (evidence > MIN_EVIDENCE).then(|| SideForcePoint {
+            sentence: sentence::side_force(tractor_frac, trailer_behind_cg_m, evidence),
+            tractor_frac,
+            trailer_behind_cg_m,
+            evidence,
         })
     }
 }

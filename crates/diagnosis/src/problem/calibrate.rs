@@ -36,7 +36,7 @@ impl Reference {
             ratio: [1.0; MODULES],
             settled: [1.0; MODULES],
             scatter: Vec::new(),
-            attack: 0.0,
+            attack_nats: 0.0,
             free_form: [if clean { 0.0 } else { FREE_FORM_NATS }; MODULES],
         }
     }

@@ -52,7 +52,7 @@ pub(crate) struct Reference {
     /// says; empty where no baseline has shown it.
     pub(crate) scatter: Vec<f64>,
     /// What the baseline says for another point where side winds act than the truck file's, nats.
-    pub(crate) attack: f64,
+    pub(crate) attack_nats: f64,
 }
 
 /// Times that the noise is learned: each needs the tolerances of the one before.
@@ -127,7 +127,7 @@ impl<'a> Problem<'a> {
                 problem.recentre()?;
             }
             if clean && round > 0 {
-                problem.reference.attack = problem.find_attack()?;
+                problem.reference.attack_nats = problem.find_attack()?;
                 problem.scatter();
                 problem.rebuild(Changed::Scatter)?;
             }

@@ -108,13 +108,7 @@ impl Results {
         }
         lines.extend(defects(&found.findings));
         if let Some(point) = &found.side_force {
-            lines.push(format!(
-                "In the baseline side winds act with {:.0} % on the tractor and {:+.1} m behind the \
-                 trailer's CG ({:.0} nats), not where the truck file says.",
-                100.0 * point.tractor_frac,
-                point.trailer_behind_cg_m,
-                point.evidence
-            ));
+            lines.push(point.sentence.clone());
         }
         if !found.tolerances_from_baseline {
             lines.push("Without a baseline the tolerances are defaults.".to_owned());

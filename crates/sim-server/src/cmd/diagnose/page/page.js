@@ -254,10 +254,7 @@ function rest() {
     byId("toml").textContent = DATA.overlay;
   } else clear("extended");
   for (const n of D.not_carried) byId("extended")?.append(node("p", `Not in it: ${words(n.id)} (${n.why}).`));
-  const push = D.side_force
-    ? ` In the baseline side winds act with ${(100 * D.side_force.tractor_frac).toFixed(0)} % on the tractor and ${D.side_force.trailer_behind_cg_m.toFixed(1)} m behind the trailer's CG (${D.side_force.evidence.toFixed(0)} nats), not where the truck file says.`
-    : "";
-  byId("footer").textContent = `Tractrix ${D.version}, revision ${D.git_revision.slice(0, 12)}, seed ${D.seed}. Tolerances ${D.tolerances_from_baseline ? "learned from baseline drives" : "are defaults: no baseline was given"}.${push}`;
+  byId("footer").textContent = `Tractrix ${D.version}, revision ${D.git_revision.slice(0, 12)}, seed ${D.seed}. Tolerances ${D.tolerances_from_baseline ? "learned from baseline drives" : "are defaults: no baseline was given"}. ${D.side_force?.sentence ?? ""}`;
 }
 
 heading(); why(); overlay(); gain(); loop(); wrong(); maps(); rest();
