@@ -3,12 +3,14 @@
 //!
 //! `cross_validate GENERATIONS[:SEED] PARTS FILE:LANES...` deals the files out to so many parts in
 //! turn (1: learn from all, and judge on the same), searches with that seed (1) and prints a line per
-//! recording: Kolmogorov-Smirnov distances of speed and gap with the measured start and arrivals
-//! (`bounded`), that of the speeds if everyone kept the speed that they came with (`kept`), those of
-//! speed and gap with flow and speeds at both ends only (`free`: eight seeds together, as bounded
-//! traffic is four; `alone`: mean and range of single seeds; `among`: mean distance of the seeds from
-//! each other), and the mean distance of the speeds from the other recordings of its name up to the
-//! first digit (`others`).
+//! recording, and the means of all. Kolmogorov-Smirnov distances of speed, where nothing else is said:
+//! * `bounded`, `bounded gap`: with the measured start and arrivals;
+//! * `kept`: if everyone kept the speed that they came with;
+//! * `free`, `free gap`: with flow, density and speeds at both ends only, the eight seeds that flow as
+//!   counted together, as bounded traffic is four; `alone` the mean of these, `among` their mean
+//!   distance from each other; `any` the first eight seeds together;
+//! * `others`: from the other recordings of its name up to the first digit, mean of these; `scaled`:
+//!   from all of these together, times the factor that gives them its mean speed.
 #![allow(clippy::disallowed_macros, reason = "a measurement program")]
 
 use std::error::Error;
@@ -16,14 +18,17 @@ use std::path::Path;
 use std::sync::Arc;
 
 use road::Road;
-use traffic_client::calibrate::{Calibration, Effort, Lesson, calibrate, drive, drive_bounded};
+use traffic_client::calibrate::{
+    Calibration, Effort, Lesson, Sieve, calibrate, drive_bounded, drives_as_counted, together,
+};
 use traffic_client::native::{Boundary, TrafficConfig};
 use traffic_client::replay::{Carriageway, Frame, Recording, load, road_of};
-use traffic_client::stats::{Quantity, Samples, kolmogorov_smirnov, observe_recording};
+use traffic_client::stats::{Quantity, Samples, kolmogorov_smirnov, moments, observe_recording};
 
-/// Free traffic is driven with these seeds, none of which the search used, each for this long, s.
-const FREE_SEEDS: std::ops::RangeInclusive<u64> = 1..=8;
+/// Free traffic is driven for this long, s, with seeds that the search did not use.
 const FREE_S: f64 = 30.0;
+/// What counts as near.
+const BOUND: f64 = 0.15;
 /// Drives of bounded traffic.
 const BOUNDED_DRIVES: u64 = 4;
 
@@ -61,17 +66,14 @@ impl Looked {
     }
 }
 
-/// Distances of speed and gap in bounded and free traffic, what kept speeds would give, and the
-/// other recordings.
+/// Its distances by name, and lane changes per km: measured, of bounded and of free traffic.
 struct Verdict {
-    bounded: [f64; 2],
-    kept: f64,
-    free: [f64; 2],
-    /// Distances of the speeds of single seeds, and the mean distance of these from each other.
-    alone: Vec<f64>,
-    among: f64,
-    others: Option<f64>,
+    distances: [(&'static str, f64); 10],
     lane_changes_1_km: [f64; 3],
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    moments(&values.collect::<Vec<_>>()).map_or(f64::NAN, |m| m.mean)
 }
 
 fn judge(one: &Looked, all: &[Looked], found: &Calibration) -> Result<Verdict, Box<dyn Error>> {
@@ -79,40 +81,53 @@ fn judge(one: &Looked, all: &[Looked], found: &Calibration) -> Result<Verdict, B
     let config = TrafficConfig { seed: 1, ..found.config.clone() };
     let boundary = Arc::new(Boundary::of(&one.road, &one.recording)?);
     let bounded = drive_bounded(&one.road, &config, &boundary, BOUNDED_DRIVES)?;
-    let free_config = found.free_traffic(&one.lesson())?;
-    let free = FREE_SEEDS
-        .map(|seed| drive(&one.road, TrafficConfig { seed, ..free_config.clone() }, FREE_S))
-        .collect::<Result<Vec<_>, _>>()?;
-    let both = |s: &Samples| [Quantity::Speed, Quantity::Gap].map(|q| one.distance(s, q));
+    let free_config = TrafficConfig { seed: 0, ..found.free_traffic(&one.lesson())? };
+    let driven = |sieve| drives_as_counted(&one.lesson(), &free_config, FREE_S, sieve);
+    let free = driven(Sieve::default())?;
+    let kept = Sieve::default().kept;
+    let any = together(driven(Sieve { driven: kept as u64, kept })?);
+    let speed = |s: &Samples| one.distance(s, Quantity::Speed);
+    let measured = one.samples.of(Quantity::Speed);
+    let to_measured = |speeds: &[f64]| kolmogorov_smirnov(speeds, measured).unwrap_or(1.0);
     let tracks = one.recording.tracks.iter();
     let kept: Vec<f64> =
         tracks.flat_map(|t| t.samples.iter().map(|_| t.samples[0].speed_m_s)).collect();
-    let others: Vec<f64> = all
-        .iter()
-        .filter(|o| o.kind() == one.kind() && o.name != one.name)
-        .map(|o| one.distance(&o.samples, Quantity::Speed))
-        .collect();
-    let free_changes = free.iter().map(Samples::lane_changes_1_km).sum::<f64>();
-    let mut together = free[0].clone();
-    free[1..].iter().for_each(|more| together.append(more));
-    let pairs = free.iter().enumerate().flat_map(|(k, a)| free[..k].iter().map(move |b| (a, b)));
+    let of_its_kind = || all.iter().filter(|o| o.kind() == one.kind() && o.name != one.name);
+    let pooled = || of_its_kind().flat_map(|o| o.samples.of(Quantity::Speed)).copied();
+    let factor = mean(measured.iter().copied()) / mean(pooled());
+    let scaled: Vec<f64> = pooled().map(|v| v * factor).collect();
+    let pairs =
+        free.iter().enumerate().flat_map(|(k, a)| free[..k].iter().map(move |b| (&a.1, &b.1)));
     let apart = |(a, b): (&Samples, &Samples)| {
         kolmogorov_smirnov(a.of(Quantity::Speed), b.of(Quantity::Speed)).unwrap_or(1.0)
     };
-    let among: Vec<f64> = pairs.map(apart).collect();
+    let among = mean(pairs.map(apart));
+    let alone = mean(free.iter().map(|(_, s)| speed(s)));
+    let lane_changes = mean(free.iter().map(|(_, s)| s.lane_changes_1_km()));
+    let free = together(free);
     Ok(Verdict {
-        bounded: both(&bounded),
-        kept: kolmogorov_smirnov(&kept, one.samples.of(Quantity::Speed)).unwrap_or(1.0),
-        free: both(&together),
-        alone: free.iter().map(|s| one.distance(s, Quantity::Speed)).collect(),
-        among: among.iter().sum::<f64>() / among.len() as f64,
-        others: (!others.is_empty()).then(|| others.iter().sum::<f64>() / others.len() as f64),
+        distances: [
+            ("bounded", speed(&bounded)),
+            ("bounded gap", one.distance(&bounded, Quantity::Gap)),
+            ("kept", to_measured(&kept)),
+            ("free", speed(&free)),
+            ("free gap", one.distance(&free, Quantity::Gap)),
+            ("any", speed(&any)),
+            ("alone", alone),
+            ("among", among),
+            ("others", mean(of_its_kind().map(|o| speed(&o.samples)))),
+            ("scaled", to_measured(&scaled)),
+        ],
         lane_changes_1_km: [
             one.samples.lane_changes_1_km(),
             bounded.lane_changes_1_km(),
-            free_changes / free.len() as f64,
+            lane_changes,
         ],
     })
+}
+
+fn line(distances: &[(&str, f64)]) -> String {
+    distances.iter().map(|(name, x)| format!("{name} {x:.3}")).collect::<Vec<_>>().join(", ")
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -124,7 +139,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (generations, parts): (usize, usize) = (generations.parse()?, parts.parse()?);
     let seed: u64 = seed.parse()?;
     let all = files.iter().map(|f| Looked::at(f)).collect::<Result<Vec<_>, _>>()?;
-    let (mut bounded_met, mut free_met, mut sums) = (0, 0, [0.0; 6]);
+    let mut judged: Vec<Verdict> = Vec::new();
     for part in 0..parts {
         let is_out = |k: usize| k % parts == part;
         let learned = all.iter().enumerate().filter(|(k, _)| parts == 1 || !is_out(*k));
@@ -137,46 +152,25 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("  {key} = {x:.3} (searched {low:.3} to {high:.3})");
         }
         for (_, one) in all.iter().enumerate().filter(|(k, _)| is_out(*k)) {
-            let v = judge(one, &all, &found)?;
-            let alone = v.alone.iter().sum::<f64>() / v.alone.len() as f64;
-            let least = v.alone.iter().copied().fold(f64::INFINITY, f64::min);
-            let most = v.alone.iter().copied().fold(0.0, f64::max);
+            let verdict = judge(one, &all, &found)?;
+            let [measured, bounded, free] = verdict.lane_changes_1_km;
             println!(
-                "{}: bounded speed {:.3} gap {:.3}, kept {:.3}, free speed {:.3} gap {:.3}, \
-                 alone {alone:.3} ({least:.3} to {most:.3}), among {:.3}, others {:.3}; lane changes per km {:.2} measured, {:.2} \
-                 bounded, {:.2} free",
+                "{}: {}; lane changes per km {measured:.2} measured, {bounded:.2} bounded, {free:.2} \
+                 free",
                 one.name,
-                v.bounded[0],
-                v.bounded[1],
-                v.kept,
-                v.free[0],
-                v.free[1],
-                v.among,
-                v.others.unwrap_or(f64::NAN),
-                v.lane_changes_1_km[0],
-                v.lane_changes_1_km[1],
-                v.lane_changes_1_km[2],
+                line(&verdict.distances)
             );
-            bounded_met += usize::from(v.bounded[0] <= 0.15);
-            free_met += usize::from(v.free[0] <= 0.15);
-            let others = v.others.unwrap_or(0.0);
-            for (sum, x) in
-                sums.iter_mut().zip([v.bounded[0], v.kept, v.free[0], alone, v.among, others])
-            {
-                *sum += x / all.len() as f64;
-            }
+            judged.push(verdict);
         }
     }
-    println!(
-        "within 0.15: bounded {bounded_met}, free {free_met} of {}; means: bounded {:.3}, kept \
-         {:.3}, free {:.3}, alone {:.3}, among {:.3}, others {:.3}",
-        all.len(),
-        sums[0],
-        sums[1],
-        sums[2],
-        sums[3],
-        sums[4],
-        sums[5],
-    );
+    let Some(first) = judged.first() else { return Err("no recording".into()) };
+    let (mut means, mut met) = (first.distances, first.distances);
+    for (k, (mean_of, met)) in means.iter_mut().zip(&mut met).enumerate() {
+        mean_of.1 = mean(judged.iter().map(|v| v.distances[k].1).filter(|x| x.is_finite()));
+        met.1 = judged.iter().filter(|v| v.distances[k].1 <= BOUND).count() as f64;
+    }
+    println!("means: {}", line(&means));
+    let within = met.map(|(name, n)| format!("{name} {n}")).join(", ");
+    println!("within {BOUND} of {}: {within}", judged.len());
     Ok(())
 }

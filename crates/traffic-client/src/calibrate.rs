@@ -12,7 +12,7 @@
 //!    the same for all recordings, say how these become a boundary. Flow over density is the mean
 //!    speed: where it is less than at the ends, the stretch begins with a queue. Bounded traffic is
 //!    told where a jam is, free traffic has to make it: with one set of drivers for both, both get
-//!    worse.
+//!    worse. It is judged by drives that flow as was counted ([`drives_as_counted`]).
 //!
 //! The measure is the mean over the recordings of a weighted sum of Kolmogorov-Smirnov distances,
 //! each weighing as much as it lasts, and a little for values that no calibration has found before
@@ -30,9 +30,11 @@ use crate::replay::Recording;
 use crate::search;
 use crate::stats::{Quantity, Samples, kolmogorov_smirnov};
 
+mod counted;
 mod drives;
 mod knobs;
 
+pub use counted::{Counted, Sieve, drives_as_counted};
 pub use drives::{drive, drive_bounded, lanes_m};
 
 use knobs::{
@@ -51,8 +53,8 @@ const WEIGHTS: [(Quantity, f64); 4] = [
 const LANE_CHANGE_WEIGHT: f64 = 0.1;
 /// Weight of the mean square of how unusual the values are, in standard deviations.
 const UNUSUAL_WEIGHT: f64 = 0.02;
-/// Drives of each recording's free traffic per trial, each with a seed of its own.
-const FREE_DRIVES: u64 = 3;
+/// Drives of each recording's free traffic per trial, and those of them that are judged.
+const FREE_DRIVES: Sieve = Sieve { driven: 12, kept: 3 };
 /// Drives of each recording's bounded traffic per trial.
 const BOUNDED_DRIVES: u64 = 2;
 
@@ -61,7 +63,7 @@ const BOUNDED_DRIVES: u64 = 2;
 pub struct Effort {
     /// Generations of each of the two searches.
     pub generations: usize,
-    /// Simulated time per drive of the free traffic after its warm-up, s; a trial has three of each
+    /// Simulated time per drive of the free traffic after its warm-up, s; a trial has twelve of each
     /// recording.
     pub trial_s: f64,
     /// Seed of the search and of its traffic.
@@ -126,7 +128,7 @@ pub fn calibrate(
     base: &TrafficConfig,
     effort: Effort,
 ) -> Result<Calibration, TrafficError> {
-    let judge = Judge::of(lessons, base, effort.trial_s)?;
+    let judge = Judge::of(lessons, effort.trial_s)?;
     let Effort { generations, seed, .. } = effort;
     let people = search::minimum(
         &bounds(&POPULATION),
@@ -182,15 +184,10 @@ struct Judge<'a> {
     /// Lane changes of all recordings per vehicle and km.
     changes_1_km: f64,
     trial_s: f64,
-    seed: u64,
 }
 
 impl<'a> Judge<'a> {
-    fn of(
-        lessons: &[Lesson<'a>],
-        base: &TrafficConfig,
-        trial_s: f64,
-    ) -> Result<Self, TrafficError> {
+    fn of(lessons: &[Lesson<'a>], trial_s: f64) -> Result<Self, TrafficError> {
         let has_gaps = |l: &Lesson<'_>| !l.samples.of(Quantity::Gap).is_empty();
         let all_s: f64 = lessons.iter().map(|l| l.samples.duration_s).sum();
         if !lessons.iter().any(has_gaps) || all_s < 1.0 {
@@ -208,12 +205,11 @@ impl<'a> Judge<'a> {
         let changes: usize = lessons.iter().map(|l| l.samples.lane_changes).sum();
         let driven_km: f64 = lessons.iter().map(|l| l.samples.driven_km).sum();
         let changes_1_km = changes as f64 / driven_km.max(1e-9);
-        Ok(Self { each, changes_1_km, trial_s, seed: base.seed })
+        Ok(Self { each, changes_1_km, trial_s })
     }
 
-    /// How far free traffic is from its recording, mean of them: all drives together, since those
-    /// of half a minute differ from each other as much as from a recording, and drivers who are
-    /// judged by single ones become all alike.
+    /// How far free traffic is from its recording, mean of them: those drives that flow as counted,
+    /// together, since drivers who are judged by single ones become all alike.
     fn free(
         &self,
         base: &TrafficConfig,
@@ -224,12 +220,8 @@ impl<'a> Judge<'a> {
         for m in &self.each {
             let measured = with_measured_demand(base, &m.lesson, &m.boundary);
             let config = with_free(&measured, population, values);
-            let mut all = Samples::default();
-            for k in 0..FREE_DRIVES {
-                let config = TrafficConfig { seed: self.seed.wrapping_add(k), ..config.clone() };
-                let samples = drive(m.lesson.road, config, self.trial_s)?;
-                if k == 0 { all = samples } else { all.append(&samples) }
-            }
+            let driven = drives_as_counted(&m.lesson, &config, self.trial_s, FREE_DRIVES)?;
+            let mut all = together(driven);
             all.sort();
             sum += m.weight * distance(&all, &m.samples);
         }
@@ -249,6 +241,15 @@ impl<'a> Judge<'a> {
         let changes = (rate - wanted).abs() / (rate + wanted).max(1e-9);
         Ok(apart + LANE_CHANGE_WEIGHT * changes)
     }
+}
+
+/// Samples of several drives as those of one.
+#[must_use]
+pub fn together(drives: Vec<(u64, Samples)>) -> Samples {
+    let mut drives = drives.into_iter().map(|(_, samples)| samples);
+    let mut all = drives.next().unwrap_or_default();
+    drives.for_each(|more| all.append(&more));
+    all
 }
 
 /// The weighted sum of distances.
@@ -290,7 +291,7 @@ mod tests {
     }
 
     /// A recording of native traffic.
-    fn recorded(road: &Arc<Road>, config: TrafficConfig, duration_s: f64) -> Recording {
+    pub(super) fn recorded(road: &Arc<Road>, config: TrafficConfig, duration_s: f64) -> Recording {
         let config = TrafficConfig { sees_ego: false, scene_radius_m: 1e5, ..config };
         let mut traffic =
             NativeTraffic::new(Arc::clone(road), Geometry::default(), config).unwrap();
@@ -363,16 +364,14 @@ mod tests {
         let samples = observe_recording(&road, &recording).unwrap();
         let lesson = Lesson { recording: &recording, road: &road, samples: &samples };
         let base = TrafficConfig { seed: 40, ..TrafficConfig::default() };
-        let judge = Judge::of(&[lesson], &base, 30.0).unwrap();
+        let judge = Judge::of(&[lesson], 30.0).unwrap();
         let (people, values) = (usual(&POPULATION), usual(&FREE));
         let together = judge.free(&base, &people, &values).unwrap();
         let boundary = Boundary::of(&road, &recording).unwrap();
         let config = with_free(&with_measured_demand(&base, &lesson, &boundary), &people, &values);
-        let alone = |k| {
-            let config = TrafficConfig { seed: base.seed + k, ..config.clone() };
-            distance(&drive(&road, config, 30.0).unwrap(), &judge.each[0].samples)
-        };
-        let alone = (0..FREE_DRIVES).map(alone).sum::<f64>() / FREE_DRIVES as f64;
+        let driven = drives_as_counted(&lesson, &config, 30.0, FREE_DRIVES).unwrap();
+        let alone = driven.iter().map(|(_, one)| distance(one, &judge.each[0].samples));
+        let alone = alone.sum::<f64>() / driven.len() as f64;
         // The distance of a mixture is never more than the mean of the distances.
         assert!(together < alone - 1e-4, "{together} together, {alone} one by one");
     }

@@ -11,7 +11,9 @@ use serde::Serialize;
 use sim::{Overrides, Scenario, Traffic, TrafficKind};
 use tractrix_core::{EgoState, Geometry, Time, TrafficSource, VehicleClass};
 use traffic_client::Mode;
-use traffic_client::calibrate::{Effort, Lesson, calibrate, drive_bounded};
+use traffic_client::calibrate::{
+    Effort, Lesson, Sieve, calibrate, drive_bounded, drives_as_counted,
+};
 use traffic_client::native::{Boundary, TrafficConfig};
 use traffic_client::replay::{Frame, Recording, Row, to_parquet};
 use traffic_client::stats::{Observer, Samples};
@@ -142,6 +144,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if !args.calibrate.is_empty() {
         (scenario, drivers) = calibrated(args, &out, scenario, &learned, seed)?;
     }
+    let seed = if args.calibrate.is_empty() { seed } else { scenario.run.seed };
     if args.diagram {
         diagram::draw(&scenario, seed, &out)?;
     }
@@ -289,9 +292,9 @@ fn in_the_middle(road: &Road) -> EgoState {
     EgoState { s_m, x_m: at.x_m, y_m: at.y_m, yaw_rad: at.heading_rad, ..EgoState::default() }
 }
 
-/// The scenario with free traffic like that of the recordings, on the road and with the boundary of
-/// the first one, and the drivers of bounded traffic; both also written, as `calibrated.toml` and
-/// `calibrated-drivers.toml`.
+/// The scenario with free traffic like that of the recordings, on the road, with the boundary and
+/// with a seed that flows as counted in the first one, and the drivers of bounded traffic; both also
+/// written, as `calibrated.toml` and `calibrated-drivers.toml`.
 fn calibrated(
     args: &Args,
     out: &OutFolder,
@@ -299,12 +302,7 @@ fn calibrated(
     learned: &Measured,
     seed: u64,
 ) -> Result<(Scenario, TrafficConfig), Failure> {
-    let (Some(road), Some(file)) = (learned.road(), learned.files.first()) else {
-        return Err(Failure::Input("--calibrate: no recording".to_owned()));
-    };
     let effort = Effort { generations: args.generations, seed, ..Effort::default() };
-    let stages = Stages::start();
-    stages.show("calibrating the drivers");
     // Judged later with traffic that was not driven in the search.
     let base = scenario.traffic.demand(seed ^ SEARCH_SEED);
     let lessons: Vec<Lesson<'_>> = learned
@@ -314,7 +312,17 @@ fn calibrated(
         .zip(&learned.each)
         .map(|((recording, road), samples)| Lesson { recording, road, samples })
         .collect();
+    let (Some(first), Some(file)) = (lessons.first(), learned.files.first()) else {
+        return Err(Failure::Input("--calibrate: no recording".to_owned()));
+    };
+    let stages = Stages::start();
+    stages.show("calibrating the drivers");
     let found = calibrate(&lessons, &base, effort).map_err(Failure::input)?;
+    let free = found.free_traffic(first).map_err(Failure::input)?;
+    stages.show("looking for seeds that flow as counted");
+    let own_seed = TrafficConfig { seed, ..free.clone() };
+    let driven = drives_as_counted(first, &own_seed, effort.trial_s, Sieve::default());
+    let seeds: Vec<u64> = driven.map_err(Failure::input)?.iter().map(|(seed, _)| *seed).collect();
     stages.finish();
     let drivers = TrafficConfig { seed, ..found.config.clone() };
     let mut scenario = scenario;
@@ -324,25 +332,25 @@ fn calibrated(
     of_drivers.traffic.family = None;
     let text = toml::to_string(&of_drivers).map_err(Failure::work)?;
     out.write("calibrated-drivers.toml", text)?;
-    let first = lessons.first().map(|lesson| found.free_traffic(lesson)).transpose();
-    let free = first.map_err(Failure::input)?.unwrap_or_else(|| drivers.clone());
     scenario.name = format!("{}-calibrated", scenario.name);
     scenario.description = format!(
         "Native drivers calibrated to {} recordings: weighted distance {:.3} in bounded and {:.3} in \
-         free traffic after {} trials.",
+         free traffic after {} trials. These seeds flow as counted in the first: {}.",
         learned.recordings.len(),
         found.distance,
         found.free_distance,
-        found.trials
+        found.trials,
+        seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", ")
     );
+    scenario.run.seed = seeds.first().copied().unwrap_or(seed);
     scenario.road = format!("recording:{}", args.lanes);
-    scenario.ego.s_m = scenario.ego.s_m.min(0.5 * road.length_m());
+    scenario.ego.s_m = scenario.ego.s_m.min(0.5 * first.road.length_m());
     let traffic = &mut scenario.traffic;
     (traffic.source, traffic.family, traffic.mode) = (TrafficKind::Native, None, None);
     let absolute = std::fs::canonicalize(file).map_err(|e| Failure::file(file, e))?;
     traffic.replay.file = Some(absolute.display().to_string());
     traffic.replay.carriageway = args.carriageway.into();
-    traffic.native = TrafficConfig { seed, ..free };
+    traffic.native = TrafficConfig { seed: scenario.run.seed, ..free };
     let text = toml::to_string(&scenario).map_err(Failure::work)?;
     out.write("calibrated.toml", text)?;
     scenario.traffic.mode = Some(Mode::Pure);

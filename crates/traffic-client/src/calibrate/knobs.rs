@@ -2,7 +2,7 @@
 
 use tractrix_core::VehicleClass;
 
-use super::{Lesson, lanes_m};
+use super::{Counted, Lesson, lanes_m};
 use crate::native::{Boundary, ClassConfig, TrafficConfig};
 use crate::stats::moments;
 
@@ -186,9 +186,9 @@ pub(super) fn with_measured_demand(
         config.outflow_sigma_m_s = beyond.sigma.min(30.0);
     }
     if let (Some(before), Some(beyond)) = (before, beyond) {
-        let mean_m_s = 1000.0 * flow_1_s / measured.density_1_km(lanes_m).max(1e-9);
-        config.initial_standing_frac =
-            standing_frac(mean_m_s, 0.5 * (before.mean + beyond.mean).max(1.0));
+        let moving_m_s = 0.5 * (before.mean + beyond.mean).max(1.0);
+        let mean_m_s = Counted::of(measured, lanes_m).mean_speed_m_s;
+        config.initial_standing_frac = standing_frac(mean_m_s, moving_m_s);
     }
     config
 }

@@ -83,11 +83,6 @@ impl Measured {
         all.lanes_m /= all.each.len().max(1) as f64;
         Ok(all)
     }
-
-    /// The road of the first recording.
-    pub(super) fn road(&self) -> Option<&Arc<Road>> {
-        self.roads.first()
-    }
 }
 
 /// Recordings of a folder, in order of their names.
