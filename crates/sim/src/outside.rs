@@ -49,31 +49,3 @@ impl Scenario {
         .collect()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn built_in_scenarios_stay_inside_and_each_way_out_is_named() {
-        for name in Scenario::names() {
-            assert!(Scenario::builtin(name).unwrap().reaches_out().is_empty(), "{name}");
-        }
-        type Change = fn(&mut Scenario);
-        let ways: [(&str, Change); 8] = [
-            ("road", |s| s.road = "/etc/map.xodr".to_owned()),
-            ("truck.file", |s| s.truck.file = "../truck.toml".to_owned()),
-            ("policy_file", |s| s.policy_file = Some("p.safetensors".to_owned())),
-            ("traffic.manifest", |s| s.traffic.manifest = Some("m.toml".to_owned())),
-            ("traffic.detectors", |s| s.traffic.detectors = Some("d.csv".to_owned())),
-            ("traffic.replay.file", |s| s.traffic.replay.file = Some("r.csv".to_owned())),
-            ("traffic.sumo", |s| s.traffic.sumo.binary = Some("/bin/sh".to_owned())),
-            ("traffic.sumo", |s| s.traffic.sumo.options = vec!["--save-state".to_owned()]),
-        ];
-        for (key, change) in ways {
-            let mut scenario = Scenario::builtin("highway").unwrap();
-            change(&mut scenario);
-            assert_eq!(scenario.reaches_out(), [key]);
-        }
-    }
-}

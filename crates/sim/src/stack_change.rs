@@ -80,35 +80,3 @@ impl StackChange {
         toml::from_str(words).map_err(|e| SimError::ChangeWords(e.to_string()))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use tractrix_core::Time;
-
-    #[test]
-    fn a_change_comes_back_from_its_words_bit_for_bit() {
-        let demand = OutsideDemand {
-            time: Time(12_345_678_901),
-            accel_m_s2: -(0.1 + 0.2),
-            road_wheel_rad: 1e-17,
-        };
-        for change in [
-            StackChange::decider("rules:72.5").unwrap(),
-            StackChange::decider("mobil").unwrap(),
-            StackChange::decider("rollout").unwrap(),
-            StackChange::decider("dqn").unwrap(),
-            StackChange::decider("keep").unwrap(),
-            StackChange::SpeedPlanner { kind: SpeedPlannerKind::Predictive },
-            StackChange::Outside { demand: Some(demand) },
-            StackChange::Outside { demand: None },
-        ] {
-            let words = change.to_toml().unwrap();
-            assert_eq!(StackChange::from_toml(&words).unwrap(), change, "{words}");
-        }
-        let wrong = StackChange::from_toml("[decider]\nkind = \"fly\"\n").unwrap_err();
-        assert!(wrong.to_string().contains("fly"), "{wrong}");
-        let wrong = StackChange::decider("dqn:../weights.safetensors").unwrap_err();
-        assert!(wrong.to_string().contains("dqn:../weights"), "{wrong}");
-    }
-}

@@ -248,7 +248,9 @@ mod tests {
     /// A force to the left that acts behind the centre of gravity turns the trailer to the right.
     #[test]
     fn the_trailers_side_force_acts_where_the_file_says() {
-        let mut r = crate::TruckParameters::load("reference").unwrap().resistance;
+        let text = "source = \"a test\"\nrolling_coeff = 0.006\ndrag_area_m2 = 6.0\ndrag_yaw_1_rad = 1.0\n\
+            side_force_area_m2_rad = 40.0\nside_force_tractor_frac = 0.25\n";
+        let mut r: ResistanceParameters = toml::from_str(text).unwrap();
         let air = AirFlow { head_m_s: 20.0, cross_m_s: 4.0, density_kg_m3: 1.2 };
         let at_cg = r.side(&air);
         r.side_force_trailer_behind_cg_m = 1.5;

@@ -22,6 +22,7 @@ mod trace;
 
 mod catalogue;
 mod cooling;
+mod data_sheet;
 mod ecu;
 mod fuel_map;
 mod full_truck_lateral;

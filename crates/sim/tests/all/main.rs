@@ -22,3 +22,4 @@ mod hot_retarder;
 mod jam;
 mod promised_fuel;
 mod rollout_decider;
+mod words;
