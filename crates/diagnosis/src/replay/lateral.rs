@@ -1,7 +1,10 @@
 //! Tractor yaw rate, trailer yaw rate and lateral acceleration from hand wheel and speed, with the
 //! linear tractor-semitrailer model of `dynamics::lateral` at the measured speed.
+//!
+//! All tyres have one relaxation length, so that their forces on the bodies lag as one: three states
+//! instead of one per axle.
 
-use dynamics::lateral::{LateralParameters, StateSpace, SteeringParameters, YawSideslip};
+use dynamics::lateral::{LateralParameters, SteeringParameters, YawSideslip};
 use tractrix_core::GRAVITY_M_S2;
 
 use super::Module as M;
@@ -46,11 +49,12 @@ fn plus(x: &State, y: &State, h: f64) -> State {
     core::array::from_fn(|i| x[i] + y[i] * h)
 }
 
-/// `A(v) = constant + inverse / v + linear v`, exactly; by columns.
+/// The state matrix of any speed, `A(v) s = tyres (s_0 / v, s_1 / v, s_2 / v, s_3) + turn v s_1` in its
+/// first three rows, and the input columns.
 struct BySpeed {
-    constant: [State; 4],
-    inverse: [State; 4],
-    linear: [State; 4],
+    /// By columns.
+    tyres: [State; 4],
+    turn: State,
     steer: State,
     tractor: State,
     trailer: State,
@@ -59,37 +63,37 @@ struct BySpeed {
 
 impl BySpeed {
     fn new(model: &YawSideslip) -> Self {
-        let at = |v: f64| -> StateSpace { model.state_space(v) };
-        let (x, y, z) = (at(1.0), at(2.0), at(4.0));
-        let mut out = Self {
-            constant: [[0.0; 4]; 4],
-            inverse: [[0.0; 4]; 4],
-            linear: [[0.0; 4]; 4],
+        let (x, y) = (model.state_space(1.0), model.state_space(2.0));
+        let column = |a: &[State; 4], j: usize| -> State {
+            core::array::from_fn(|i| if i < 3 { a[i][j] } else { 0.0 })
+        };
+        // The yaw rate's column is `tyres / v + turn v`.
+        let (one, two) = (column(&x.a, 1), column(&y.a, 1));
+        let turn = core::array::from_fn(|i| (2.0 * two[i] - one[i]) / 3.0);
+        Self {
+            tyres: [column(&x.a, 0), plus(&one, &turn, -1.0), column(&x.a, 2), column(&x.a, 3)],
+            turn,
             steer: x.b_steer,
             tractor: x.b_tractor_force,
             trailer: x.b_trailer_force,
             trailer_moment: x.b_trailer_moment,
-        };
-        for i in 0..4 {
-            for j in 0..4 {
-                // a = c + i + l, b = c + i/2 + 2 l, e = c + i/4 + 4 l
-                let (a, b, e) = (x.a[i][j], y.a[i][j], z.a[i][j]);
-                let inverse = (8.0 * a - 12.0 * b + 4.0 * e) / 3.0;
-                let linear = b - a + 0.5 * inverse;
-                out.inverse[j][i] = inverse;
-                out.linear[j][i] = linear;
-                out.constant[j][i] = a - inverse - linear;
-            }
         }
-        out
     }
 
+    /// Accelerations by the tyres' steady side forces per state, by columns, at `1 / v`.
     #[inline(always)]
-    fn at(&self, v: f64) -> [State; 4] {
-        let w = 1.0 / v;
-        core::array::from_fn(|j| {
-            plus(&plus(&self.constant[j], &self.inverse[j], w), &self.linear[j], v)
-        })
+    fn tyres(&self, per_speed: f64) -> [State; 4] {
+        let [a, b, c, d] = &self.tyres;
+        [a.map(|x| x * per_speed), b.map(|x| x * per_speed), c.map(|x| x * per_speed), *d]
+    }
+
+    /// The state matrix with a part of the tyres' side forces.
+    #[inline(always)]
+    fn matrix(&self, tyres: &[State; 4], part: f64, v: f64) -> [State; 4] {
+        let mut a = tyres.map(|c| c.map(|x| x * part));
+        a[1] = plus(&a[1], &self.turn, v);
+        (a[1][3], a[2][3]) = (1.0, -1.0);
+        a
     }
 }
 
@@ -132,29 +136,47 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
     let side_force = SideForce::new(d, plant, t);
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     let bias = [P::YawBias, P::TrailerYawBias, P::AccelYBias].map(|p| t[p as usize]);
+    let relaxation_m =
+        (plant.lateral.tyres.relaxation_length_m + t[P::Relaxation as usize]).max(0.0);
     let dt = Drive::STEP_S;
     let rows = (d.n / 2).saturating_sub(2);
     let mut out = [vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]];
     let mut s: State = [0.0; 4];
     let mut next = road_wheel.step(0);
+    // What the tyres' forces keep of the last half sample, and what they take of their goal at its end.
+    let (mut kept, mut end): (State, f64) = ([0.0; 4], 1.0);
     for from in (0..2 * rows).step_by(BLOCK) {
         let force = side_force.block(from);
         for (i, force) in (from..2 * rows).zip(force) {
             let v = (d.speed[i] * speed_scale).max(MIN_SPEED_M_S);
-            let a = system.at(v);
+            let w = 1.0 / v;
             let side = plus(&bank, &wind, force);
             let before = next;
             next = road_wheel.step(i + 1);
-            let u0 = plus(&side, &system.steer, before);
-            let um = plus(&side, &system.steer, 0.5 * (before + next));
-            let u1 = plus(&side, &system.steer, next);
-            let k1 = rate(&a, &s, &u0);
+            let steer = |angle: f64| system.steer.map(|x| x * angle);
+            let middle = steer(0.5 * (before + next));
+            // Runge and Kutta's steps of the bodies; the tyres' lag is solved exactly over each half
+            // for goals that move evenly, so that no speed makes a short length unstable.
+            let tyres = system.tyres(w);
+            let goal = rate(&tyres, &s, &steer(before));
+            let built = plus(&kept, &goal, end);
+            let (keep, [begin, part]) = first_order_hold(relaxation_m * w, 0.5 * dt);
+            end = part;
+            let a = system.matrix(&tyres, end, v);
+            let mut k1 = plus(&plus(&built, &side, 1.0), &system.turn, v * s[1]);
+            k1[3] = s[1] - s[2];
             let lateral = k1[0] + v * s[1] + bank_m_s2;
             out[0][i / 2] += 0.5 * (d.yaw[i] - s[1] - bias[0]);
             out[1][i / 2] += 0.5 * (d.trailer_yaw[i] - s[2] - bias[1]);
             out[2][i / 2] += 0.5 * (d.accel_y[i] - lateral - bias[2]);
+            let begun = plus(&built.map(|x| x * keep), &goal, begin);
+            let um = plus(&plus(&begun, &side, 1.0), &middle, end);
             let k2 = rate(&a, &plus(&s, &k1, 0.5 * dt), &um);
-            let k3 = rate(&a, &plus(&s, &k2, 0.5 * dt), &um);
+            let s3 = plus(&s, &k2, 0.5 * dt);
+            let k3 = rate(&a, &s3, &um);
+            let goal = rate(&tyres, &s3, &middle);
+            kept = plus(&plus(&begun, &goal, end).map(|x| x * keep), &goal, begin);
+            let u1 = plus(&plus(&kept, &side, 1.0), &steer(next), end);
             let k4 = rate(&a, &plus(&s, &k3, dt), &u1);
             let sum: State = core::array::from_fn(|j| k1[j] + 2.0 * (k2[j] + k3[j]) + k4[j]);
             s = plus(&s, &sum, dt / 6.0).map(|x| x.clamp(-50.0, 50.0));
@@ -199,7 +221,7 @@ impl<'a> RoadWheel<'a> {
         let centring_1_s = steering.free_play_centring_1_s + t[P::PlayCentring as usize];
         let gear = d.steer[0];
         let target = (gear - offset) / ratio;
-        let (keep, shares) = first_order_hold(lag);
+        let (keep, shares) = first_order_hold(lag, Drive::STEP_S);
         Self {
             steer: &d.steer,
             delay: dead_s / Drive::STEP_S,
@@ -233,14 +255,13 @@ impl<'a> RoadWheel<'a> {
     }
 }
 
-/// What is left of the state of a first-order lag after a sample, and what it takes of its target at
-/// the begin and at the end of the sample, exactly for a target that moves evenly in between.
-fn first_order_hold(lag_s: f64) -> (f64, [f64; 2]) {
-    if lag_s < 1e-3 {
-        return (0.0, [0.0, 1.0]);
-    }
-    let keep = (-Drive::STEP_S / lag_s).exp();
-    let end = 1.0 - (1.0 - keep) * lag_s / Drive::STEP_S;
+/// What is left of the state of a first-order lag after `over_s`, and what it takes of its target at the
+/// begin and at the end of it, exactly for a target that moves evenly in between.
+#[inline(always)]
+fn first_order_hold(lag_s: f64, over_s: f64) -> (f64, [f64; 2]) {
+    let lag_s = lag_s.max(0.0);
+    let keep = (-over_s / lag_s).exp();
+    let end = 1.0 - (1.0 - keep) * lag_s / over_s;
     (keep, [1.0 - keep - end, end])
 }
 
@@ -251,7 +272,7 @@ mod tests {
     #[test]
     fn a_lag_follows_a_ramp_one_lag_behind_whatever_the_sample_time() {
         for lag in [0.02, 0.08, 0.3] {
-            let (keep, shares) = first_order_hold(lag);
+            let (keep, shares) = first_order_hold(lag, Drive::STEP_S);
             let mut angle = 0.0;
             for i in 0..200 {
                 let target = f64::from(i) * Drive::STEP_S;

@@ -235,6 +235,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::CrosswindBehind
         | P::SideShare
         | P::SideBehind
+        | P::Relaxation
         | P::Bank
         | P::AccelYBias
         | P::TrailerYawBias => &[G::Lateral],
@@ -297,5 +298,7 @@ pub(crate) fn replay_group(
 
 #[cfg(test)]
 mod invariance;
+#[cfg(test)]
+mod relaxation;
 #[cfg(test)]
 pub(crate) mod tests;

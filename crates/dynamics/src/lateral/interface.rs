@@ -22,6 +22,9 @@ pub struct LateralState {
     pub yaw_rate_rad_s: f64,
     /// omega_t of the 4-state model, rad/s.
     pub trailer_yaw_rate_rad_s: f64,
+    /// Slip angle per axle that the tyres' forces follow, rad; 0 for tyres without a relaxation length.
+    #[serde(default)]
+    pub tyre_slip_rad: [f64; AXLES],
     /// Steering gear.
     pub steering: SteeringState,
 }
@@ -77,7 +80,8 @@ pub struct LateralOutputs {
     pub articulation_rad: f64,
     /// Road-wheel angle, rad.
     pub road_wheel_rad: f64,
-    /// Slip angle per axle, rad, positive when it gives a force to the left.
+    /// Slip angle per axle, rad, positive when it gives a force to the left; the wheels', which the
+    /// tyres follow over their relaxation length.
     pub slip_rad: [f64; AXLES],
     /// Side force per axle, N, to the left.
     pub side_force_n: [f64; AXLES],

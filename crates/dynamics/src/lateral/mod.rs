@@ -11,6 +11,7 @@
 //! | `tyre` | cornering stiffness over load, saturation, friction ellipse |
 //! | `kinematic` | Eq. 1 of the paper, corrected, with effective lengths of axle groups |
 //! | `yaw_sideslip` | Eq. 3-10 of the paper, corrected: the 4-state model |
+//! | `relaxation` | side force that builds up over a rolled distance |
 //! | `steering` | hand wheel to road wheel: limits, offset, free play, ratio, lag |
 //! | `limits` | articulation stop, load transfer, rollover threshold |
 //! | `interface` | state, inputs, outputs |
@@ -21,14 +22,15 @@
 //! tractor's drive-axle group, on the ground. Articulation is trailer heading minus tractor heading
 //! (the paper's psi of Eq. 1); the 4-state model's gamma is its negative.
 //!
-//! Left out: roll and pitch dynamics, tyre relaxation length, left-right differences, steering
-//! compliance, longitudinal load transfer.
+//! Left out: roll and pitch dynamics, left-right differences, steering compliance, longitudinal load
+//! transfer.
 
 mod interface;
 mod kinematic;
 mod limits;
 mod model;
 mod parameters;
+mod relaxation;
 mod rosenbrock;
 mod steering;
 mod tyre;

@@ -13,8 +13,9 @@
 //! Left out: small-angle geometry is kept above the blend (articulation beyond 0.3 rad at speed is
 //! outside the model), and side forces do not move the kinematic model.
 
+use super::relaxation::Relaxation;
 use super::rosenbrock::{ROS2, Solver, mass_times};
-use super::yaw_sideslip::Loads;
+use super::yaw_sideslip::{Force3, Loads};
 use super::{
     AXLES, Kinematic, LateralError, LateralInputs, LateralOutputs, LateralParameters, LateralState,
     LoadTransfer, StateSpace, SteeringParameters, YawSideslip,
@@ -34,6 +35,9 @@ pub struct LateralModel {
     steering: SteeringParameters,
     max_articulation_rad: f64,
 }
+
+/// Slip angles of the axles, rad.
+type Slip = [f64; AXLES];
 
 /// Velocities in use, after blending.
 #[derive(Clone, Copy)]
@@ -140,27 +144,37 @@ impl LateralModel {
         let loads = self.loads(inputs);
         let v = inputs.speed_m_s.max(BLEND_LOW_M_S);
         let weight = blend(inputs.speed_m_s);
-        let s0 = [
-            state.cg_lateral_speed_m_s,
-            state.yaw_rate_rad_s,
-            state.trailer_yaw_rate_rad_s,
-            -state.articulation_rad,
-        ];
-        let solver = Solver::new(m, v, loads.specific_force_m_s2, ROS2 * dt, weight);
-        let rate = |s: &[f64; 4], delta: f64| {
-            let u = self.motion(inputs.speed_m_s, weight, s, delta);
-            (m.force(v, s, delta, &loads), u.yaw_rate_rad_s - u.trailer_yaw_rate_rad_s)
-        };
-        let (g, r) = rate(&s0, deltas[0]);
-        let k1 = solver.solve(g, r);
-        let s1: [f64; 4] = core::array::from_fn(|i| s0[i] + dt * k1[i]);
-        let (g, r) = rate(&s1, deltas[1]);
+        let s0 = reduced(state);
+        let lag = Relaxation::new(m, v, dt);
+        let tyre_frac = lag.map_or(1.0, |lag| lag.tyre_frac);
+        let solver = Solver::new(m, v, loads.specific_force_m_s2, ROS2 * dt, weight, tyre_frac);
         // The second stage solves with f - 2 k1, here premultiplied by H.
-        let hk = mass_times(m, &k1);
-        let k2 = solver.solve(core::array::from_fn(|i| g[i] - 2.0 * hk[i]), r - 2.0 * k1[3]);
+        let stage = |s: &[f64; 4], tyres: &Slip, delta: f64, first: Option<&([f64; 4], Slip)>| {
+            let wheels = m.slip_rad(v, s, delta);
+            let hk = first.map_or([0.0; 3], |(k, _)| mass_times(m, k));
+            let (k3, less) = first.map_or((0.0, [0.0; AXLES]), |(k, t)| (k[3], t.map(|x| 2.0 * x)));
+            let acting = if lag.is_some() { tyres } else { &wheels };
+            let g = m.force(v, s, delta, acting, &loads);
+            let g: Force3 = core::array::from_fn(|i| g[i] - 2.0 * hk[i]);
+            let u = self.motion(inputs.speed_m_s, weight, s, delta);
+            let r = u.yaw_rate_rad_s - u.trailer_yaw_rate_rad_s - 2.0 * k3;
+            let Some(lag) = lag else { return (solver.solve(g, r), [0.0; AXLES]) };
+            let own = lag.own(&wheels, tyres, &less);
+            let own_force = lag.force(m, &own);
+            let k = solver.solve(core::array::from_fn(|i| g[i] + own_force[i]), r);
+            (k, lag.rate(m, v, &k, &own))
+        };
+        let first = stage(&s0, &state.tyre_slip_rad, deltas[0], None);
+        let (k1, t1) = &first;
+        let s1 = core::array::from_fn(|i| s0[i] + dt * k1[i]);
+        let tyres1 = core::array::from_fn(|j| state.tyre_slip_rad[j] + dt * t1[j]);
+        let (k2, t2) = stage(&s1, &tyres1, deltas[1], Some(&first));
         let s: [f64; 4] = core::array::from_fn(|i| s0[i] + dt * (1.5 * k1[i] + 0.5 * k2[i]));
         let s = self.stop(s);
-        self.move_pose(state, inputs.speed_m_s, weight, [&s0, &s], deltas, dt)
+        let next = self.move_pose(state, inputs.speed_m_s, weight, [&s0, &s], deltas, dt);
+        let tyre_slip_rad =
+            core::array::from_fn(|j| state.tyre_slip_rad[j] + dt * (1.5 * t1[j] + 0.5 * t2[j]));
+        LateralState { tyre_slip_rad, ..next }
     }
 
     /// Articulation stop: clamps gamma and makes the bodies turn together if they fold further,
@@ -205,7 +219,7 @@ impl LateralModel {
             cg_lateral_speed_m_s: s[1][0],
             yaw_rate_rad_s: s[1][1],
             trailer_yaw_rate_rad_s: s[1][2],
-            steering: state.steering,
+            ..*state
         }
     }
 
@@ -261,16 +275,12 @@ impl LateralModel {
         let v = inputs.speed_m_s.max(BLEND_LOW_M_S);
         let weight = blend(inputs.speed_m_s);
         let delta = state.steering.road_wheel_rad;
-        let s = [
-            state.cg_lateral_speed_m_s,
-            state.yaw_rate_rad_s,
-            state.trailer_yaw_rate_rad_s,
-            -state.articulation_rad,
-        ];
+        let s = reduced(state);
         let slip_rad = m.slip_rad(v, &s, delta);
+        let acting = if m.relaxation_length_m > 0.0 { &state.tyre_slip_rad } else { &slip_rad };
         let side_force_n: [f64; AXLES] =
-            core::array::from_fn(|j| loads.tyres[j].side_force_n(slip_rad[j]));
-        let [vy_dot, wc_dot, wt_dot] = m.accelerations(&m.force(v, &s, delta, &loads));
+            core::array::from_fn(|j| loads.tyres[j].side_force_n(acting[j]));
+        let [vy_dot, wc_dot, wt_dot] = m.accelerations(&m.force(v, &s, delta, acting, &loads));
         let u = self.motion(inputs.speed_m_s, weight, &s, delta);
         // Below the blend the turn is taken as steady.
         let turn = inputs.speed_m_s * u.yaw_rate_rad_s;
@@ -298,6 +308,17 @@ impl LateralModel {
             load_transfer_ratio: self.load_transfer.ratio(tractor, trailer, inputs.bank_rad),
         }
     }
+}
+
+/// The 4-state model's state.
+#[inline]
+fn reduced(state: &LateralState) -> [f64; 4] {
+    [
+        state.cg_lateral_speed_m_s,
+        state.yaw_rate_rad_s,
+        state.trailer_yaw_rate_rad_s,
+        -state.articulation_rad,
+    ]
 }
 
 /// Weight of the 4-state model over speed: 0 below the blend, 1 above, smooth between.

@@ -23,7 +23,8 @@ pub(super) fn mass_times(m: &YawSideslip, k: &[f64; 4]) -> Force3 {
     core::array::from_fn(|i| h[i][0] * k[0] + h[i][1] * k[1] + h[i][2] * k[2])
 }
 
-/// Factors of `H - c A_h` with the articulation eliminated: `k_4 = r + c w (k_2 - k_3)`.
+/// Factors of `H - c A_h` with the articulation eliminated: `k_4 = r + c w (k_2 - k_3)`, and with the
+/// tyres' own slip angles, which leave a part of their side force there.
 pub(super) struct Solver {
     /// Triangular factors of the 3x3 system; reciprocal pivots on the diagonal.
     lu: [[f64; 3]; 3],
@@ -34,8 +35,15 @@ pub(super) struct Solver {
 
 impl Solver {
     #[inline]
-    pub(super) fn new(m: &YawSideslip, v: f64, specific_force: f64, c: f64, weight: f64) -> Self {
-        let (h, j) = (m.mass_matrix(), m.force_jacobian(v, specific_force));
+    pub(super) fn new(
+        m: &YawSideslip,
+        v: f64,
+        specific_force: f64,
+        c: f64,
+        weight: f64,
+        tyre_frac: f64,
+    ) -> Self {
+        let (h, j) = (m.mass_matrix(), m.force_jacobian(v, specific_force, tyre_frac));
         let cw = c * weight;
         let gamma: Force3 = core::array::from_fn(|i| c * j[i][3]);
         let mut a: [[f64; 3]; 3] =

@@ -17,7 +17,11 @@
 //! brush model is 15 % low there. Under a longitudinal force the side force that is left follows
 //! the friction ellipse.
 //!
-//! Left out: camber, aligning moment, relaxation length, speed-dependent friction.
+//! A rolling tyre builds its side force up over a distance, the relaxation length: a slip angle of its
+//! own follows the axle's (`relaxation`), and the law takes that one.
+//!
+//! Left out: camber, aligning moment, speed-dependent friction, a relaxation length that changes with
+//! load or slip.
 
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +44,10 @@ pub struct TyreParameters {
     /// Measured cornering stiffness per axle, N/rad, instead of the load formula.
     #[serde(default)]
     pub axle_stiffness_n_rad: Option<[f64; AXLES]>,
+    /// Distance rolled until side force has made 63 % of its way to what the slip angle asks for, m;
+    /// 0: it follows at once. Heavy-truck tyres have 0.3 to 1 m.
+    #[serde(default)]
+    pub relaxation_length_m: f64,
     /// Linear or saturating.
     pub law: TyreLaw,
 }
@@ -64,6 +72,7 @@ impl TyreParameters {
     pub(super) fn check(&self, check: &mut impl FnMut(&str, f64, f64, f64)) {
         check("tyres.cornering_coeff_per_rad", self.cornering_coeff_per_rad, 0.0, 50.0);
         check("tyres.load_degression_frac", self.load_degression_frac, 0.0, 0.9);
+        check("tyres.relaxation_length_m", self.relaxation_length_m, 0.0, 5.0);
         check("tyres.rated_load_n", self.rated_load_n, 1e3, 1e5);
         for n in self.tyres_per_axle {
             check("tyres.tyres_per_axle", n, 1.0, 8.0);

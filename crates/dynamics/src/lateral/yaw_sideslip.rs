@@ -55,6 +55,8 @@ pub struct YawSideslip {
     pub stiffness_n_rad: [f64; AXLES],
     /// Static axle loads, N.
     pub axle_load_n: [f64; AXLES],
+    /// Relaxation length of the tyres, m.
+    pub relaxation_length_m: f64,
     /// Tyre law.
     pub law: TyreLaw,
     /// Inverse of the upper-left 3x3 block of H.
@@ -108,6 +110,7 @@ impl YawSideslip {
             axle_position_m: p.axle_positions_m(),
             stiffness_n_rad: p.tyres.stiffness_n_rad(&load),
             axle_load_n: load,
+            relaxation_length_m: p.tyres.relaxation_length_m,
             law: p.tyres.law,
             inverse_mass: [[0.0; 3]; 3],
         };
@@ -135,13 +138,21 @@ impl YawSideslip {
         })
     }
 
-    /// A_h of Eq. 8 without its last row: derivative of the generalised forces by the state.
+    /// A_h of Eq. 8 without its last row: derivative of the generalised forces by the state, with this
+    /// part of the tyres' side force.
     #[inline]
-    pub(super) fn force_jacobian(&self, v: f64, specific_force: f64) -> [[f64; 4]; 3] {
-        let (x, c) = (&self.axle_position_m, &self.stiffness_n_rad);
+    pub(super) fn force_jacobian(
+        &self,
+        v: f64,
+        specific_force: f64,
+        tyre_frac: f64,
+    ) -> [[f64; 4]; 3] {
+        let x = &self.axle_position_m;
+        let c = self.stiffness_n_rad.map(|c| c * tyre_frac);
         let (lh, lt, mt) =
             (self.hitch_behind_cg_m, self.trailer_cg_behind_hitch_m, self.trailer_mass_kg);
         let (c3, s1, s2) = self.trailer_moments();
+        let (c3, s1, s2) = (c3 * tyre_frac, s1 * tyre_frac, s2 * tyre_frac);
         let c12 = c[0] + c[1] + c[2];
         let z1 = x[0] * c[0] + x[1] * c[1] + x[2] * c[2];
         let z2 = x[0] * x[0] * c[0] + x[1] * x[1] * c[1] + x[2] * x[2] * c[2];
@@ -157,7 +168,7 @@ impl YawSideslip {
     /// State matrix and input columns of the linear model at speed `v` > 0, m/s (Eq. 10).
     #[must_use]
     pub fn state_space(&self, v: f64) -> StateSpace {
-        let jacobian = self.force_jacobian(v, 0.0);
+        let jacobian = self.force_jacobian(v, 0.0, 1.0);
         let column = |k: usize| self.accelerations(&core::array::from_fn(|i| jacobian[i][k]));
         let columns: [Force3; 4] = core::array::from_fn(column);
         let mut a = [[0.0; 4]; 4];
@@ -204,10 +215,28 @@ impl YawSideslip {
         })
     }
 
-    /// Generalised forces g of `H s' = g`, first three rows.
+    /// Generalised forces of side forces of the axles, N.
     #[inline]
-    pub(super) fn force(&self, v: f64, s: &[f64; 4], delta: f64, loads: &Loads) -> Force3 {
-        let slip = self.slip_rad(v, s, delta);
+    pub(super) fn of_axles(&self, f: &[f64; AXLES]) -> Force3 {
+        let x = &self.axle_position_m;
+        let trailer = f[3] + f[4] + f[5];
+        [
+            f[0] + f[1] + f[2] + trailer,
+            x[0] * f[0] + x[1] * f[1] + x[2] * f[2] - self.hitch_behind_cg_m * trailer,
+            -(x[3] * f[3] + x[4] * f[4] + x[5] * f[5]),
+        ]
+    }
+
+    /// Generalised forces g of `H s' = g`, first three rows, with the tyres at these slip angles, rad.
+    #[inline]
+    pub(super) fn force(
+        &self,
+        v: f64,
+        s: &[f64; 4],
+        delta: f64,
+        slip: &[f64; AXLES],
+        loads: &Loads,
+    ) -> Force3 {
         let f: [f64; AXLES] = core::array::from_fn(|j| loads.tyres[j].side_force_n(slip[j]));
         let x = &self.axle_position_m;
         let fx = &loads.longitudinal_n;

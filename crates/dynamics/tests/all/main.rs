@@ -29,6 +29,7 @@ mod full_truck_lateral;
 mod lateral_closed_forms;
 mod lateral_fidelity;
 mod lateral_multibody;
+mod lateral_relaxation;
 mod lateral_robustness;
 mod lateral_stability;
 mod longitudinal;

@@ -34,6 +34,7 @@ pub(crate) fn empty_19t() -> LateralParameters {
             load_degression_frac: 0.18,
             rated_load_n: 30_000.0,
             tyres_per_axle: [2.0, 4.0, 4.0],
+            relaxation_length_m: 0.0,
             stiffness_scale: [1.0; 3],
             axle_stiffness_n_rad: None,
             law: TyreLaw::Linear,
