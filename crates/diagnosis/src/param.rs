@@ -92,11 +92,10 @@ pub(crate) enum P {
     CrosswindBehind,
     SideShare,
     SideBehind,
-    Relaxation,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 84;
+pub(crate) const PARAMS: usize = 83;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -237,8 +236,6 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     // The same of the truck in order, whose baseline shows it by the winds of its days.
     s(P::SideShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
     s(P::SideBehind, "trailer_behind_cg_m", "m", (1.0, -4.0, 4.0, 0.2), 0.0, 0.0),
-    // Truck tyres have 0.3 to 1 m, and no data sheet says it; load, pressure and heat move it.
-    s(P::Relaxation, "relaxation_length_m", "m", (0.3, -1.5, 1.5, 0.1), 0.05, 0.4),
 ];
 
 impl Spec {

@@ -188,8 +188,6 @@ mod tests {
             Prepared::new(&drive, &plant)
         });
         let mut problem = Problem::learn(&plant, drives.into(), false, &Serial).unwrap();
-        // Tyres of any relaxation length take most of what these drives have of the point.
-        problem.reference.tolerance[P::Relaxation as usize] = 0.0;
         // A wind that blew on all drives, so that the residual depends on the point as well.
         problem.reference.theta[P::Crosswind as usize] = 3.0;
         problem.rebuild(Changed::Everything).unwrap();

@@ -7,8 +7,8 @@ use super::{Direction, Problem, Reference, nuisance_directions, replay};
 use crate::DiagnosisError;
 use crate::decisions::{FREE_FORM_NATS, MEAN_PRIOR, SCATTER_PRIOR};
 use crate::hypothesis::CATALOGUE;
-use crate::param::{P, PARAMS, SPECS, Spec, Theta};
-use crate::replay::{Group, MODULES, Module, Prepared, Residuals, affects};
+use crate::param::{P, PARAMS, SPECS, Theta};
+use crate::replay::{MODULES, Module, Prepared, Residuals};
 use crate::stats::whiten::Whitener;
 
 const SCATTER_ROUNDS: usize = 25;
@@ -94,7 +94,7 @@ impl Problem<'_> {
     /// mean is what this truck and its weather are like when all is well (a crosswind of any sign
     /// adds drag): causes count from there.
     pub(super) fn scatter(&mut self) {
-        let specs: Vec<&Spec> =
+        let specs: Vec<&crate::param::Spec> =
             nuisance_directions(&self.reference.tolerance).iter().map(|d| d.p.spec()).collect();
         let systems: Vec<(DMatrix<f64>, DVector<f64>)> = (0..self.drives.len())
             .map(|i| {
@@ -167,7 +167,7 @@ impl Problem<'_> {
         &self,
         theta: &mut Theta,
         best: &mut f64,
-        free: &[&Spec],
+        free: &[&crate::param::Spec],
         cost: &dyn Fn(f64, &Theta) -> f64,
     ) {
         for s in free.iter().filter(|s| s.unit == "s") {
@@ -215,39 +215,17 @@ impl Problem<'_> {
 
     /// Gauss-Newton steps of the common calibration.
     pub(super) fn calibrate(&mut self, first: bool) -> Result<(), DiagnosisError> {
-        let known: Vec<&Spec> = SPECS.iter().filter(|s| s.calibration > 0.0).collect();
-        let cost = |norm: f64, t: &Theta| {
-            norm + known.iter().map(|s| (t[s.p as usize] / s.calibration).powi(2)).sum::<f64>()
-        };
-        let mut theta = self.reference.theta;
-        let mut best = cost(self.gram(&theta, &[]).sum(|_| true).2, &theta);
-        let rounds = if first { 4 } else { 2 };
-        let lags: Vec<&Spec> = known.iter().copied().filter(|s| s.p != P::Relaxation).collect();
-        self.newton(&mut theta, &mut best, &lags, rounds, &cost)?;
-        if first {
-            self.creep(&mut theta, &mut best, &known, &cost);
-        }
-        // By themselves: tyres and steering both delay, and where another lag has its kink no common
-        // step tells how much each.
-        let lateral: Vec<&Spec> =
-            known.iter().copied().filter(|s| affects(s.p) == [Group::Lateral]).collect();
-        self.newton(&mut theta, &mut best, &lateral, rounds, &cost)?;
-        self.reference.theta = theta;
-        self.rebuild(if first { Changed::Everything } else { Changed::Scatter })
-    }
-
-    fn newton(
-        &self,
-        theta: &mut Theta,
-        best: &mut f64,
-        free: &[&Spec],
-        rounds: usize,
-        cost: &dyn Fn(f64, &Theta) -> f64,
-    ) -> Result<(), DiagnosisError> {
+        let free: Vec<&crate::param::Spec> = SPECS.iter().filter(|s| s.calibration > 0.0).collect();
         let directions: Vec<Direction> =
             free.iter().map(|s| Direction::new(s.p, Vec::new(), 0.3 * s.step)).collect();
-        for _ in 0..rounds {
-            let (mut a, mut b, _) = self.gram(theta, &directions).sum(|_| true);
+        let cost = |norm: f64, t: &Theta| {
+            norm + free.iter().map(|s| (t[s.p as usize] / s.calibration).powi(2)).sum::<f64>()
+        };
+        let mut theta = self.reference.theta;
+        let mut gram = self.gram(&theta, &directions);
+        let mut best = cost(gram.sum(|_| true).2, &theta);
+        for _ in 0..if first { 4 } else { 2 } {
+            let (mut a, mut b, _) = gram.sum(|_| true);
             for (j, s) in free.iter().enumerate() {
                 let precision = 1.0 / (s.calibration * s.calibration);
                 a[(j, j)] += precision;
@@ -260,14 +238,15 @@ impl Problem<'_> {
             let mut factor = 1.0;
             let mut improved = false;
             while !improved && factor > 0.05 {
-                let mut t = *theta;
+                let mut t = theta;
                 for (s, d) in free.iter().zip(step.iter()) {
                     let x = &mut t[s.p as usize];
                     *x = (*x + factor * d).clamp(s.lo, s.hi);
                 }
                 let c = cost(self.gram(&t, &[]).sum(|_| true).2, &t);
-                if c < *best {
-                    (*theta, *best, improved) = (t, c, true);
+                if c < best {
+                    (theta, best, improved) = (t, c, true);
+                    gram = self.gram(&theta, &directions);
                 }
                 factor *= 0.4;
             }
@@ -275,6 +254,10 @@ impl Problem<'_> {
                 break;
             }
         }
-        Ok(())
+        if first {
+            self.creep(&mut theta, &mut best, &free, &cost);
+        }
+        self.reference.theta = theta;
+        self.rebuild(if first { Changed::Everything } else { Changed::Scatter })
     }
 }

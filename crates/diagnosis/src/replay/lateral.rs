@@ -136,8 +136,7 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
     let side_force = SideForce::new(d, plant, t);
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     let bias = [P::YawBias, P::TrailerYawBias, P::AccelYBias].map(|p| t[p as usize]);
-    let relaxation_m =
-        (plant.lateral.tyres.relaxation_length_m + t[P::Relaxation as usize]).max(0.0);
+    let relaxation_m = plant.lateral.tyres.relaxation_length_m;
     let dt = Drive::STEP_S;
     let rows = (d.n / 2).saturating_sub(2);
     let mut out = [vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]];

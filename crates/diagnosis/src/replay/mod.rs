@@ -235,7 +235,6 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::CrosswindBehind
         | P::SideShare
         | P::SideBehind
-        | P::Relaxation
         | P::Bank
         | P::AccelYBias
         | P::TrailerYawBias => &[G::Lateral],

@@ -15,9 +15,8 @@ const TRAILER_AXLES: [f64; 3] = [7.9 - 1.2, 7.9, 7.9 + 1.2];
 const PAYLOAD_CG: f64 = 5.764;
 const PAYLOAD_GYRATION2: f64 = 9.9;
 
-/// Side slip speed of the tractor's CG, yaw rates of tractor and trailer, their angle, and how far the
-/// tyres of each axle are bent to the side, as the slip angle that would keep them so.
-pub(crate) type State = [f64; 10];
+/// Side slip speed of the tractor's CG, yaw rates of tractor and trailer, their angle.
+pub(crate) type State = [f64; 4];
 
 /// Both bodies with one load.
 pub(crate) struct Bodies {
@@ -26,8 +25,6 @@ pub(crate) struct Bodies {
     trailer_cg: f64,
     /// Axle stiffness: steer, two drive axles, three trailer axles, N/rad.
     stiffness: [f64; 6],
-    /// Way on which the tyres bend, m; 0: they follow the slip angle at once.
-    relaxation_m: f64,
     inverse: [[f64; 3]; 3],
 }
 
@@ -76,38 +73,24 @@ impl Bodies {
             [-HITCH * m, TRACTOR_IZZ + m * HITCH * HITCH, m * HITCH * cg],
             [-cg * m, cg * m * HITCH, izz + m * cg * cg],
         ];
-        Self {
-            trailer_kg: m,
-            trailer_izz: izz,
-            trailer_cg: cg,
-            stiffness: c,
-            relaxation_m: f.relaxation_m,
-            inverse: inverse(a),
-        }
+        Self { trailer_kg: m, trailer_izz: izz, trailer_cg: cg, stiffness: c, inverse: inverse(a) }
     }
 
     /// Rate of the state at speed `v`, road-wheel angle `delta` and side forces on the two CGs, N; the last one is
     /// what turns the trailer about its CG to the right, Nm.
     pub(crate) fn rate(&self, s: &State, v: f64, delta: f64, side: [f64; 3]) -> State {
-        let [slip, w, wt, angle, bent @ ..] = *s;
+        let [slip, w, wt, angle] = *s;
         let c = &self.stiffness;
-        let rolls = |axle: usize| match axle {
-            0 => delta - (slip + STEER_AHEAD * w) / v,
-            1 | 2 => -(slip - DRIVE[axle - 1] * w) / v,
-            _ => -((slip - HITCH * w - TRAILER_AXLES[axle - 3] * wt) / v + angle),
-        };
-        let pushes =
-            |axle: usize| c[axle] * if self.relaxation_m > 0.0 { bent[axle] } else { rolls(axle) };
-        let mut force = pushes(0);
+        let mut force = c[0] * (delta - (slip + STEER_AHEAD * w) / v);
         let mut moment = STEER_AHEAD * force;
-        for (axle, a) in DRIVE.iter().enumerate() {
-            let f = pushes(1 + axle);
+        for (c, a) in c[1..3].iter().zip(DRIVE) {
+            let f = -c * (slip - a * w) / v;
             force += f;
             moment -= a * f;
         }
         let (mut behind, mut turn) = (0.0, 0.0);
-        for (axle, l) in TRAILER_AXLES.iter().enumerate() {
-            let f = pushes(3 + axle);
+        for (c, l) in c[3..].iter().zip(TRAILER_AXLES) {
+            let f = -c * ((slip - HITCH * w - l * wt) / v + angle);
             behind += f;
             turn += l * f;
         }
@@ -120,13 +103,7 @@ impl Bodies {
             -turn + self.trailer_cg * m * v * w,
         ];
         let x = self.inverse.map(|r| r[0] * right[0] + r[1] * right[1] + r[2] * right[2]);
-        let mut rate = [x[0], x[1], x[2], w - wt, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        if self.relaxation_m > 0.0 {
-            for (axle, r) in rate[4..].iter_mut().enumerate() {
-                *r = v / self.relaxation_m * (rolls(axle) - bent[axle]);
-            }
-        }
-        rate
+        [x[0], x[1], x[2], w - wt]
     }
 
     /// One midpoint step.

@@ -88,7 +88,7 @@ pub(crate) fn drive(
     let (mut v, mut place, mut altitude) = (0.5_f64, 0.0_f64, setting.altitude_m);
     let mut heading = between(rng, -3.0, 3.0);
     let (begun, mut course) = (heading, heading);
-    let mut lateral: State = [0.0; 10];
+    let mut lateral: State = [0.0; 4];
     let (mut gear_rad, mut delta, mut offset) = (0.0_f64, 0.0_f64, 0.0_f64);
     let (mut pressure, mut brake_k, mut coolant) = (0.0_f64, 0.0_f64, 80.0_f64);
     let (mut pedals, mut demands, mut wheels) = (Delay::new(), Delay::new(), Delay::new());

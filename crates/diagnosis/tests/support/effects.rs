@@ -150,8 +150,6 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
             "cornering_stiffness_front" => f.stiffness[0] *= 1.0 + x,
             "cornering_stiffness_drive" => f.stiffness[1] *= 1.0 + x,
             "cornering_stiffness_trailer" => f.stiffness[2] *= 1.0 + x,
-            // No fault: what the tyres of a truck are like.
-            "tyre_relaxation" => f.relaxation_m += x,
             "payload_position" => {
                 f.payload_rearward_m += x;
                 f.tyres_follow = shape.choice(0, 2) == 1;

@@ -79,8 +79,6 @@ pub(crate) struct Figures {
     pub(crate) tyres_follow: bool,
     pub(crate) payload_rearward_m: f64,
     pub(crate) stiffness: [f64; 3],
-    /// Way on which the tyres build up their side force, m.
-    pub(crate) relaxation_m: f64,
     pub(crate) steer_ratio: f64,
     pub(crate) steer_offset_rad: f64,
     pub(crate) free_play_rad: f64,
@@ -127,7 +125,6 @@ impl Figures {
         tyres_follow: false,
         payload_rearward_m: 0.0,
         stiffness: [1.0; 3],
-        relaxation_m: 0.0,
         steer_ratio: 24.0,
         steer_offset_rad: 0.0,
         free_play_rad: 0.0,
