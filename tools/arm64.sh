@@ -11,15 +11,11 @@ export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
 # the bits do not depend on it, and it compiles in half the time
 export CARGO_PROFILE_RELEASE_OPT_LEVEL=1
-plain=()
-for crate in clarabel driver-models libm nalgebra planner road tractrix-core; do
-  plain+=(--config "profile.release.package.$crate.opt-level=1")
-done
 
 log=$(mktemp)
 trap 'rm -f "$log" "$log.bin"' EXIT
 # with the features that ./test has built the rest with: macros and build scripts are not built again
-timeout 900 cargo "${plain[@]}" test --workspace --release --locked --features sim-server/foxglove \
+timeout 900 cargo test --workspace --release --locked --features sim-server/foxglove \
   --target $target --bin truck-node --test same_bits -- --nocapture >"$log" 2>&1 ||
   { cat "$log"; exit 1; }
 grep -E '^(test result|     Running)' "$log"

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use road::Road;
 use traffic_client::calibrate::{
-    Calibration, Effort, Lesson, Sieve, calibrate, drive_bounded, drives_as_counted, together,
+    Calibration, Effort, Lesson, RejectionSampling, calibrate, drive_bounded, drives_as_counted,
 };
 use traffic_client::native::{Boundary, TrafficConfig};
 use traffic_client::replay::{Carriageway, Frame, Recording, load, road_of};
@@ -82,10 +82,14 @@ fn judge(one: &Looked, all: &[Looked], found: &Calibration) -> Result<Verdict, B
     let boundary = Arc::new(Boundary::of(&one.road, &one.recording)?);
     let bounded = drive_bounded(&one.road, &config, &boundary, BOUNDED_DRIVES)?;
     let free_config = TrafficConfig { seed: 0, ..found.free_traffic(&one.lesson())? };
-    let driven = |sieve| drives_as_counted(&one.lesson(), &free_config, FREE_S, sieve);
-    let free = driven(Sieve::default())?;
-    let kept = Sieve::default().kept;
-    let any = together(driven(Sieve { driven: kept as u64, kept })?);
+    let driven = |candidates, accepted| {
+        let sampling = RejectionSampling { candidates, accepted };
+        let drives = drives_as_counted(&one.lesson(), &free_config, FREE_S, sampling)?;
+        Ok::<Vec<Samples>, Box<dyn Error>>(drives.into_iter().map(|(_, samples)| samples).collect())
+    };
+    let RejectionSampling { candidates, accepted } = RejectionSampling::default();
+    let free = driven(candidates, accepted)?;
+    let any = Samples::pooled(&driven(accepted as u64, accepted)?);
     let speed = |s: &Samples| one.distance(s, Quantity::Speed);
     let measured = one.samples.of(Quantity::Speed);
     let to_measured = |speeds: &[f64]| kolmogorov_smirnov(speeds, measured).unwrap_or(1.0);
@@ -96,15 +100,14 @@ fn judge(one: &Looked, all: &[Looked], found: &Calibration) -> Result<Verdict, B
     let pooled = || of_its_kind().flat_map(|o| o.samples.of(Quantity::Speed)).copied();
     let factor = mean(measured.iter().copied()) / mean(pooled());
     let scaled: Vec<f64> = pooled().map(|v| v * factor).collect();
-    let pairs =
-        free.iter().enumerate().flat_map(|(k, a)| free[..k].iter().map(move |b| (&a.1, &b.1)));
+    let pairs = free.iter().enumerate().flat_map(|(k, a)| free[..k].iter().map(move |b| (a, b)));
     let apart = |(a, b): (&Samples, &Samples)| {
         kolmogorov_smirnov(a.of(Quantity::Speed), b.of(Quantity::Speed)).unwrap_or(1.0)
     };
     let among = mean(pairs.map(apart));
-    let alone = mean(free.iter().map(|(_, s)| speed(s)));
-    let lane_changes = mean(free.iter().map(|(_, s)| s.lane_changes_1_km()));
-    let free = together(free);
+    let alone = mean(free.iter().map(speed));
+    let lane_changes = mean(free.iter().map(Samples::lane_changes_1_km));
+    let free = Samples::pooled(&free);
     Ok(Verdict {
         distances: [
             ("bounded", speed(&bounded)),

@@ -34,7 +34,7 @@ mod counted;
 mod drives;
 mod knobs;
 
-pub use counted::{Counted, Sieve, drives_as_counted};
+pub use counted::{MacroscopicState, RejectionSampling, drives_as_counted};
 pub use drives::{drive, drive_bounded, lanes_m};
 
 use knobs::{
@@ -54,7 +54,7 @@ const LANE_CHANGE_WEIGHT: f64 = 0.1;
 /// Weight of the mean square of how unusual the values are, in standard deviations.
 const UNUSUAL_WEIGHT: f64 = 0.02;
 /// Drives of each recording's free traffic per trial, and those of them that are judged.
-const FREE_DRIVES: Sieve = Sieve { driven: 12, kept: 3 };
+const FREE_DRIVES: RejectionSampling = RejectionSampling { candidates: 12, accepted: 3 };
 /// Drives of each recording's bounded traffic per trial.
 const BOUNDED_DRIVES: u64 = 2;
 
@@ -221,7 +221,7 @@ impl<'a> Judge<'a> {
             let measured = with_measured_demand(base, &m.lesson, &m.boundary);
             let config = with_free(&measured, population, values);
             let driven = drives_as_counted(&m.lesson, &config, self.trial_s, FREE_DRIVES)?;
-            let mut all = together(driven);
+            let mut all = Samples::pooled(driven.iter().map(|(_, samples)| samples));
             all.sort();
             sum += m.weight * distance(&all, &m.samples);
         }
@@ -241,15 +241,6 @@ impl<'a> Judge<'a> {
         let changes = (rate - wanted).abs() / (rate + wanted).max(1e-9);
         Ok(apart + LANE_CHANGE_WEIGHT * changes)
     }
-}
-
-/// Samples of several drives as those of one.
-#[must_use]
-pub fn together(drives: Vec<(u64, Samples)>) -> Samples {
-    let mut drives = drives.into_iter().map(|(_, samples)| samples);
-    let mut all = drives.next().unwrap_or_default();
-    drives.for_each(|more| all.append(&more));
-    all
 }
 
 /// The weighted sum of distances.

@@ -137,6 +137,7 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     let bias = [P::YawBias, P::TrailerYawBias, P::AccelYBias].map(|p| t[p as usize]);
     let relaxation_m = plant.lateral.tyres.relaxation_length_m;
+    let relaxes = relaxation_m > 0.0;
     let dt = Drive::STEP_S;
     let rows = (d.n / 2).saturating_sub(2);
     let mut out = [vec![0.0; rows], vec![0.0; rows], vec![0.0; rows]];
@@ -168,13 +169,16 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
             out[0][i / 2] += 0.5 * (d.yaw[i] - s[1] - bias[0]);
             out[1][i / 2] += 0.5 * (d.trailer_yaw[i] - s[2] - bias[1]);
             out[2][i / 2] += 0.5 * (d.accel_y[i] - lateral - bias[2]);
-            let begun = plus(&built.map(|x| x * keep), &goal, begin);
+            let begun =
+                if relaxes { plus(&built.map(|x| x * keep), &goal, begin) } else { [0.0; 4] };
             let um = plus(&plus(&begun, &side, 1.0), &middle, end);
             let k2 = rate(&a, &plus(&s, &k1, 0.5 * dt), &um);
             let s3 = plus(&s, &k2, 0.5 * dt);
             let k3 = rate(&a, &s3, &um);
-            let goal = rate(&tyres, &s3, &middle);
-            kept = plus(&plus(&begun, &goal, end).map(|x| x * keep), &goal, begin);
+            if relaxes {
+                let goal = rate(&tyres, &s3, &middle);
+                kept = plus(&plus(&begun, &goal, end).map(|x| x * keep), &goal, begin);
+            }
             let u1 = plus(&plus(&kept, &side, 1.0), &steer(next), end);
             let k4 = rate(&a, &plus(&s, &k3, dt), &u1);
             let sum: State = core::array::from_fn(|j| k1[j] + 2.0 * (k2[j] + k3[j]) + k4[j]);
@@ -258,7 +262,9 @@ impl<'a> RoadWheel<'a> {
 /// begin and at the end of it, exactly for a target that moves evenly in between.
 #[inline(always)]
 fn first_order_hold(lag_s: f64, over_s: f64) -> (f64, [f64; 2]) {
-    let lag_s = lag_s.max(0.0);
+    if lag_s <= 0.0 {
+        return (0.0, [0.0, 1.0]);
+    }
     let keep = (-over_s / lag_s).exp();
     let end = 1.0 - (1.0 - keep) * lag_s / over_s;
     (keep, [1.0 - keep - end, end])

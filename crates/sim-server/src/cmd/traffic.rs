@@ -12,7 +12,7 @@ use sim::{Overrides, Scenario, Traffic, TrafficKind};
 use tractrix_core::{EgoState, Geometry, Time, TrafficSource, VehicleClass};
 use traffic_client::Mode;
 use traffic_client::calibrate::{
-    Effort, Lesson, Sieve, calibrate, drive_bounded, drives_as_counted,
+    Effort, Lesson, RejectionSampling, calibrate, drive_bounded, drives_as_counted,
 };
 use traffic_client::native::{Boundary, TrafficConfig};
 use traffic_client::replay::{Frame, Recording, Row, to_parquet};
@@ -135,16 +135,16 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if scenario.traffic.mode() == Mode::Inter {
         scenario.traffic.mode = Some(Mode::Pure);
     }
-    let seed = scenario.seed(args.seed).map_err(Failure::input)?;
+    scenario.run.seed = scenario.seed(args.seed).map_err(Failure::input)?;
     // Read before anything is written: what cannot be used is refused at once.
     let read = |paths: &[PathBuf]| Measured::read(paths, args.lanes.into(), args.carriageway);
     let measured = read(&args.compare)?;
     let learned = read(&args.calibrate)?;
-    let mut drivers = scenario.traffic.demand(seed);
+    let mut drivers = scenario.traffic.demand(scenario.run.seed);
     if !args.calibrate.is_empty() {
-        (scenario, drivers) = calibrated(args, &out, scenario, &learned, seed)?;
+        (scenario, drivers) = calibrated(args, &out, scenario, &learned)?;
     }
-    let seed = if args.calibrate.is_empty() { seed } else { scenario.run.seed };
+    let seed = scenario.run.seed;
     if args.diagram {
         diagram::draw(&scenario, seed, &out)?;
     }
@@ -300,8 +300,8 @@ fn calibrated(
     out: &OutFolder,
     scenario: Scenario,
     learned: &Measured,
-    seed: u64,
 ) -> Result<(Scenario, TrafficConfig), Failure> {
+    let seed = scenario.run.seed;
     let effort = Effort { generations: args.generations, seed, ..Effort::default() };
     // Judged later with traffic that was not driven in the search.
     let base = scenario.traffic.demand(seed ^ SEARCH_SEED);
@@ -321,7 +321,7 @@ fn calibrated(
     let free = found.free_traffic(first).map_err(Failure::input)?;
     stages.show("looking for seeds that flow as counted");
     let own_seed = TrafficConfig { seed, ..free.clone() };
-    let driven = drives_as_counted(first, &own_seed, effort.trial_s, Sieve::default());
+    let driven = drives_as_counted(first, &own_seed, effort.trial_s, RejectionSampling::default());
     let seeds: Vec<u64> = driven.map_err(Failure::input)?.iter().map(|(seed, _)| *seed).collect();
     stages.finish();
     let drivers = TrafficConfig { seed, ..found.config.clone() };

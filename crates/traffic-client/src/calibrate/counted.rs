@@ -11,32 +11,33 @@ use crate::TrafficError;
 use crate::native::TrafficConfig;
 use crate::stats::Samples;
 
-/// How many seeds are driven, and how many of them are kept.
+/// How many seeds are driven, and how many of them are accepted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sieve {
+pub struct RejectionSampling {
     /// Driven: the seeds after that of the traffic.
-    pub driven: u64,
-    /// Kept, the nearest.
-    pub kept: usize,
+    pub candidates: u64,
+    /// Of these the nearest.
+    pub accepted: usize,
 }
 
-impl Default for Sieve {
-    /// With 16, 32, 64, 128 and 256 driven ones recordings that were held back are ever nearer.
+impl Default for RejectionSampling {
+    /// With 16, 32, 64, 128 and 256 candidates recordings that were held back are ever nearer.
     fn default() -> Self {
-        Self { driven: 256, kept: 8 }
+        Self { candidates: 256, accepted: 8 }
     }
 }
 
-/// What counts give of the traffic on a stretch (Edie's definitions).
+/// What detectors give of the traffic on a stretch (Edie, Proc. 2nd Int. Symp. on the Theory of Traffic
+/// Flow (1963) 139).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Counted {
-    /// Flow over density: mean speed over space, m/s.
+pub struct MacroscopicState {
+    /// Flow over density: space mean speed, m/s.
     pub mean_speed_m_s: f64,
     /// Vehicles per kilometre and lane.
     pub density_1_km: f64,
 }
 
-impl Counted {
+impl MacroscopicState {
     /// That of samples of a road with so many metres of lanes.
     #[must_use]
     pub fn of(samples: &Samples, lanes_m: f64) -> Self {
@@ -65,19 +66,19 @@ pub fn drives_as_counted(
     lesson: &Lesson<'_>,
     free: &TrafficConfig,
     duration_s: f64,
-    sieve: Sieve,
+    sampling: RejectionSampling,
 ) -> Result<Vec<(u64, Samples)>, TrafficError> {
     let lanes_m = lanes_m(lesson.road);
-    let measured = Counted::of(lesson.samples, lanes_m);
+    let measured = MacroscopicState::of(lesson.samples, lanes_m);
     let mut nearest: Vec<(f64, u64, Samples)> = Vec::new();
-    for k in 1..=sieve.driven {
+    for k in 1..=sampling.candidates {
         let seed = free.seed.wrapping_add(k);
         let samples = drive(lesson.road, TrafficConfig { seed, ..free.clone() }, duration_s)?;
-        let apart = Counted::of(&samples, lanes_m).apart(&measured);
+        let apart = MacroscopicState::of(&samples, lanes_m).apart(&measured);
         let place = nearest.partition_point(|other| other.0 <= apart);
-        if place < sieve.kept {
+        if place < sampling.accepted {
             nearest.insert(place, (apart, seed, samples));
-            nearest.truncate(sieve.kept);
+            nearest.truncate(sampling.accepted);
         }
     }
     Ok(nearest.into_iter().map(|(_, seed, samples)| (seed, samples)).collect())
@@ -88,13 +89,13 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::calibrate::{tests::recorded, together};
+    use crate::calibrate::tests::recorded;
     use crate::stats::{Quantity, kolmogorov_smirnov, observe_recording};
     use road::builtin;
 
     #[test]
     fn counts_of_a_road_are_far_apart_by_speed_and_by_density() {
-        let at = |mean_speed_m_s, density_1_km| Counted { mean_speed_m_s, density_1_km };
+        let at = |mean_speed_m_s, density_1_km| MacroscopicState { mean_speed_m_s, density_1_km };
         assert_eq!(at(10.0, 20.0).apart(&at(10.0, 20.0)), 0.0);
         let twice = std::f64::consts::LN_2 * std::f64::consts::LN_2;
         assert!((at(10.0, 20.0).apart(&at(5.0, 40.0)) - 2.0 * twice).abs() < 1e-12);
@@ -123,11 +124,11 @@ mod tests {
             let recording = recorded(&road, truth, 30.0);
             let samples = observe_recording(&road, &recording).unwrap();
             let lesson = Lesson { recording: &recording, road: &road, samples: &samples };
-            let apart = |driven: u64| {
-                let sieve = Sieve { driven, kept: 8 };
-                let drives = drives_as_counted(&lesson, &jam, 30.0, sieve).unwrap();
+            let apart = |candidates: u64| {
+                let sampling = RejectionSampling { candidates, accepted: 8 };
+                let drives = drives_as_counted(&lesson, &jam, 30.0, sampling).unwrap();
                 assert_eq!(drives.len(), 8);
-                let all = together(drives);
+                let all = Samples::pooled(drives.iter().map(|(_, one)| one));
                 kolmogorov_smirnov(all.of(Quantity::Speed), samples.of(Quantity::Speed)).unwrap()
             };
             counted += apart(128);

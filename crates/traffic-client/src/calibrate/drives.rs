@@ -37,17 +37,16 @@ pub fn drive_bounded(
     boundary: &Arc<Boundary>,
     drives: u64,
 ) -> Result<Samples, TrafficError> {
-    let mut all = Samples::default();
-    for k in 0..drives {
+    let one = |k: u64| {
         let seed = config.seed.wrapping_add(k);
         let config = TrafficConfig { sees_ego: false, scene_radius_m: 1e5, seed, ..config.clone() };
         let (road, geometry) = (Arc::clone(road), Geometry::default());
         let mut traffic =
             NativeTraffic::bounded(Arc::clone(&road), geometry, config, Arc::clone(boundary))?;
-        let samples = observe(&mut traffic, &road, boundary.duration_s())?;
-        if k == 0 { all = samples } else { all.append(&samples) }
-    }
-    Ok(all)
+        observe(&mut traffic, &road, boundary.duration_s())
+    };
+    let each = (0..drives).map(one).collect::<Result<Vec<_>, TrafficError>>()?;
+    Ok(Samples::pooled(&each))
 }
 
 fn observe(

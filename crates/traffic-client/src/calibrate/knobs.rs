@@ -2,7 +2,7 @@
 
 use tractrix_core::VehicleClass;
 
-use super::{Counted, Lesson, lanes_m};
+use super::{Lesson, MacroscopicState, lanes_m};
 use crate::native::{Boundary, ClassConfig, TrafficConfig};
 use crate::stats::moments;
 
@@ -187,7 +187,7 @@ pub(super) fn with_measured_demand(
     }
     if let (Some(before), Some(beyond)) = (before, beyond) {
         let moving_m_s = 0.5 * (before.mean + beyond.mean).max(1.0);
-        let mean_m_s = Counted::of(measured, lanes_m).mean_speed_m_s;
+        let mean_m_s = MacroscopicState::of(measured, lanes_m).mean_speed_m_s;
         config.initial_standing_frac = standing_frac(mean_m_s, moving_m_s);
     }
     config

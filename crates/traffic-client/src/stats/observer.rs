@@ -92,8 +92,16 @@ impl Samples {
         }
     }
 
-    /// Adds the samples of another observation of the same kind.
-    pub fn append(&mut self, other: &Self) {
+    /// Samples of several observations of the same kind as those of one.
+    #[must_use]
+    pub fn pooled<'a>(each: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut each = each.into_iter();
+        let mut all = each.next().cloned().unwrap_or_default();
+        each.for_each(|other| all.append(other));
+        all
+    }
+
+    fn append(&mut self, other: &Self) {
         for (mine, theirs) in self.values.iter_mut().zip(&other.values) {
             mine.extend_from_slice(theirs);
         }
@@ -117,7 +125,7 @@ impl Samples {
         self.driven_h * 3600.0 / self.duration_s.max(1e-9) / (lanes_m * 1e-3).max(1e-9)
     }
 
-    /// Mean flow (Edie's definition) on a road with this many metres of lanes, vehicles per hour
+    /// Mean flow (Edie, Proc. 2nd Int. Symp. on the Theory of Traffic Flow (1963) 139) on a road with this many metres of lanes, vehicles per hour
     /// and lane.
     #[must_use]
     pub fn flow_1_h(&self, lanes_m: f64) -> f64 {

@@ -71,15 +71,11 @@ impl Measured {
             let kept = kept.flat_map(|(first, t)| t.samples.iter().map(|_| first.speed_m_s));
             all.kept_m_s.push(kept.collect());
             all.lanes_m += traffic_client::calibrate::lanes_m(&road);
-            if all.each.is_empty() {
-                all.samples = samples.clone();
-            } else {
-                all.samples.append(&samples);
-            }
             all.each.push(samples);
             all.roads.push(road);
             all.recordings.push(recording);
         }
+        all.samples = Samples::pooled(&all.each);
         all.lanes_m /= all.each.len().max(1) as f64;
         Ok(all)
     }

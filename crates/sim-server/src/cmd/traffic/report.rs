@@ -137,8 +137,9 @@ impl Comparison {
             Kind::Free => (
                 "distances",
                 0.15,
-                "the scenario's own demand (inflow, density, speeds at both ends) and drivers; \
-                 nothing is taken from the recordings compared with",
+                "the scenario's own demand (inflow, density, speeds at both ends), drivers and seed, \
+                 which a calibration takes from its first recording; nothing else is taken from \
+                 the recordings compared with",
             ),
             Kind::Bounded => (
                 "bounded",
@@ -249,9 +250,8 @@ impl Report {
         let there = !measured.each.is_empty();
         let recordings =
             measured.files.iter().zip(&measured.each).enumerate().map(|(k, (f, s))| {
-                let mut others = Samples::default();
                 let rest = measured.each.iter().enumerate().filter(|&(j, _)| j != k);
-                rest.for_each(|(_, other)| others.append(other));
+                let others = Samples::pooled(rest.map(|(_, other)| other));
                 OneRecording {
                     file: f.display().to_string(),
                     figures: figures(s, measured.lanes_m),
@@ -261,9 +261,8 @@ impl Report {
                         .then(|| distances(s, &others)),
                 }
             });
-        let together: Option<Bounded> = bounded.first().map(|first| {
-            let mut all = first.clone();
-            bounded.iter().skip(1).for_each(|b| all.append(b));
+        let together = (!bounded.is_empty()).then(|| {
+            let all = Samples::pooled(bounded);
             Bounded::new(&all, &measured.samples, &measured.kept_m_s.concat())
         });
         let distances = there.then(|| distances(&driven.samples, &measured.samples));
