@@ -8,16 +8,17 @@ from typing import Any
 from playwright.sync_api import Page
 from running import running
 
-TALK = """async ([said, enough_ms, answers]) => {
+TALK = """async ([said, enough_ms, answers, frames]) => {
     const opens = performance.now();
     const socket = new WebSocket(`ws://${location.host}/ws`);
     const heard = [];
     socket.onmessage = (event) => heard.push([performance.now(), JSON.parse(event.data)]);
     await new Promise((open) => { socket.onopen = open; });
     for (const words of said) socket.send(typeof words === "string" ? words : JSON.stringify(words));
-    const answered = () => heard.filter(([, m]) => m.kind === "ack" || m.kind === "refused").length;
+    const count = (...kinds) => heard.filter(([, m]) => kinds.includes(m.kind)).length;
+    const lacks = () => count("ack", "refused") < answers || count("frame") < frames;
     const began = performance.now(), over = () => performance.now() - began;
-    while (over() < enough_ms || (answered() < answers && over() < 20000)) {
+    while (over() < enough_ms || (lacks() && over() < 20000)) {
         await new Promise((soon) => setTimeout(soon, 20));
     }
     socket.close();
@@ -26,10 +27,12 @@ TALK = """async ([said, enough_ms, answers]) => {
 }"""
 
 
-def talk(page: Page, *said: Any, enough_ms: int = 100) -> list[tuple[float, Any]]:
-    """What a viewer hears, with the time in ms, until all that it says is answered."""
+def talk(
+    page: Page, *said: Any, enough_ms: int = 100, frames: int = 0
+) -> list[tuple[float, Any]]:
+    """What a viewer hears, with the time in ms, until all it says is answered and the frames are in."""
     heard: list[tuple[float, Any]] = page.evaluate(
-        TALK, [list(said), enough_ms, len(said)]
+        TALK, [list(said), enough_ms, len(said), frames]
     )
     return heard
 
@@ -49,9 +52,9 @@ def test_a_viewer_is_greeted_chooses_its_channels_and_commands(
 ) -> None:
     with running(server, tmp_path, "--decider", "external", "--seed", "1") as run:
         page.goto(run.url)
-        # On a busy machine the first plan takes its time
         page.wait_for_selector("#state:text-is('running')")
-        heard = talk(page, enough_ms=800)
+        # On a busy machine the first plan takes its time
+        heard = talk(page, enough_ms=800, frames=2)
         hello = heard[0][1]
         assert (hello["kind"], hello["session"]) == ("hello", "default")
         assert hello["subscribed"] == ["frames", "strip", "events"]
@@ -61,7 +64,7 @@ def test_a_viewer_is_greeted_chooses_its_channels_and_commands(
 
         slow = {"action": "subscribe", "channel": "frames", "rate_hz": 4, "id": "slow"}
         quiet = {"action": "unsubscribe", "channel": "strip", "id": 2}
-        heard = talk(page, slow, quiet, enough_ms=2000)
+        heard = talk(page, slow, quiet, enough_ms=2000, frames=2)
         answers = {ack["id"]: ack for ack in kinds(heard, "ack")}
         assert answers["slow"]["subscribed"] == ["frames", "strip", "events"]
         assert answers[2]["subscribed"] == ["frames", "events"]
