@@ -15,7 +15,7 @@ export CARGO_PROFILE_RELEASE_OPT_LEVEL=1
 log=$(mktemp)
 trap 'rm -f "$log" "$log.bin"' EXIT
 # with the features that ./test has built the rest with: macros and build scripts are not built again
-timeout 900 cargo test --workspace --release --locked --features sim-server/foxglove \
+timeout 900 cargo test --workspace --release --locked \
   --target $target --bin truck-node --test same_bits -- --nocapture >"$log" 2>&1 ||
   { cat "$log"; exit 1; }
 grep -E '^(test result|     Running)' "$log"

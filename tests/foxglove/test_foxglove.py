@@ -1,6 +1,6 @@
 """`--foxglove`, seen by a viewer: the recording's bytes, time, services, commands, parameters, refusals.
 
-`SIM_SERVER` names a program that was built with `--features foxglove`.
+`SIM_SERVER` names the program.
 """
 
 from __future__ import annotations

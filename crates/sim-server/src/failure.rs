@@ -91,12 +91,6 @@ impl Failure {
         Self::Input(format!("{}: {error}", path.display()))
     }
 
-    /// Something that the program was built without.
-    pub(crate) fn not_built(feature: &str) -> Self {
-        let build = format!("cargo build --release -p sim-server --features {feature}");
-        Self::Input(format!("--{feature}: this program was built without it ({build})"))
-    }
-
     /// The process exit code.
     pub(crate) const fn exit_code(&self) -> u8 {
         match self {

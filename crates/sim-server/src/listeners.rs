@@ -9,9 +9,7 @@ use crate::session::Handle;
 /// The networks that a session is shown on.
 #[derive(Default)]
 pub(crate) struct Listeners {
-    #[cfg(feature = "ros2")]
     ros2: Option<ros2::Node>,
-    #[cfg(feature = "foxglove")]
     foxglove: Option<crate::foxglove_live::Live>,
 }
 
@@ -19,57 +17,32 @@ pub(crate) struct Listeners {
 #[derive(Debug, Clone)]
 pub(crate) struct Wanted {
     /// How the truck is reached, as `--vehicle` says.
-    #[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "the node's alone"))]
     pub(crate) vehicle: String,
     /// A node of a ROS 2 domain.
     pub(crate) ros2: bool,
     /// Under Autoware's names too.
-    #[cfg_attr(not(feature = "ros2"), expect(dead_code, reason = "the node's alone"))]
     pub(crate) with_autoware: bool,
     /// A server of Foxglove's protocol, on this port.
     pub(crate) foxglove: Option<u16>,
     /// Origins of pages that it shows the run to, beside those of this computer and Foxglove's own.
-    #[cfg_attr(not(feature = "foxglove"), expect(dead_code, reason = "the server's alone"))]
     pub(crate) foxglove_origins: Vec<String>,
 }
 
-impl Wanted {
-    /// Refuses what the program was built without.
-    ///
-    /// # Errors
-    /// [`Failure::Input`] says how to build it.
-    pub(crate) fn refuse_unbuilt(&self) -> Result<(), Failure> {
-        let ros2 = self.ros2 && cfg!(not(feature = "ros2"));
-        let foxglove = self.foxglove.is_some() && cfg!(not(feature = "foxglove"));
-        match (ros2, foxglove) {
-            (true, _) => Err(Failure::not_built("ros2")),
-            (_, true) => Err(Failure::not_built("foxglove")),
-            _ => Ok(()),
-        }
-    }
-}
-
 impl Listeners {
-    /// Joins what was asked for, of what the program was built with.
+    /// Joins what was asked for.
     ///
     /// # Errors
     /// [`Failure::Input`]: a ROS domain with a clock already, a port that is taken.
-    #[cfg_attr(
-        not(feature = "foxglove"),
-        expect(unused_variables, reason = "each feature uses its own")
-    )]
     pub(crate) fn start(
         wanted: Wanted,
         session: &Handle,
         runtime: &runtime::Handle,
     ) -> Result<Self, Failure> {
         Ok(Self {
-            #[cfg(feature = "ros2")]
             ros2: wanted
                 .ros2
                 .then(|| crate::ros2_node::start(session, &wanted.vehicle, wanted.with_autoware))
                 .transpose()?,
-            #[cfg(feature = "foxglove")]
             foxglove: wanted
                 .foxglove
                 .map(|port| {
@@ -82,12 +55,10 @@ impl Listeners {
 
     /// What the recording of the next run tells them.
     pub(crate) fn listener(&self) -> Option<Listener> {
-        let asked_for: Vec<Option<Listener>> = Vec::from([
-            #[cfg(feature = "ros2")]
+        let asked_for: [Option<Listener>; 2] = [
             self.ros2.as_ref().map(ros2::Node::listener),
-            #[cfg(feature = "foxglove")]
             self.foxglove.as_ref().map(crate::foxglove_live::Live::listener),
-        ]);
+        ];
         let mut all: Vec<Listener> = asked_for.into_iter().flatten().collect();
         match all.len() {
             0 => None,

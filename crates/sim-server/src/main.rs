@@ -10,11 +10,8 @@ mod cli;
 mod cmd;
 mod dashboard;
 mod failure;
-#[cfg(feature = "foxglove")]
 mod foxglove_door;
-#[cfg(feature = "foxglove")]
 mod foxglove_live;
-#[cfg(feature = "foxglove")]
 mod foxglove_played;
 mod jobs;
 mod listeners;
@@ -24,7 +21,6 @@ mod picture;
 mod progress;
 mod provenance;
 mod replayed;
-#[cfg(feature = "ros2")]
 mod ros2_node;
 mod run_folder;
 mod session;

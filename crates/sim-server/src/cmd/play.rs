@@ -1,13 +1,15 @@
 //! `play RUN.mcap`: a finished recording for viewers of Foxglove's protocol.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
 
 use crate::failure::Failure;
 
 /// Shows a finished recording to Foxglove and Lichtblick, which play, pause, seek and choose the
-/// speed; until a signal. Needs a program that is built with `--features foxglove`.
+/// speed; until a signal.
 #[derive(Debug, Parser)]
 pub(crate) struct Args {
     /// The recording.
@@ -22,17 +24,7 @@ pub(crate) struct Args {
 }
 
 /// Runs the command.
-#[cfg(not(feature = "foxglove"))]
-pub(crate) fn run(_: Args) -> Result<(), Failure> {
-    Err(Failure::not_built("foxglove"))
-}
-
-/// Runs the command.
-#[cfg(feature = "foxglove")]
 pub(crate) fn run(args: Args) -> Result<(), Failure> {
-    use std::sync::Arc;
-    use std::sync::atomic::AtomicBool;
-
     let Args { file, foxglove, foxglove_origin } = args;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)

@@ -96,8 +96,7 @@ pub(crate) struct Args {
     ros2_names: Option<Names>,
     /// Shows the run to Foxglove and Lichtblick, and takes commands from them, on this port of
     /// 127.0.0.1 (0: a free one). No program is authenticated; of pages in a browser those of this
-    /// machine and of app.foxglove.dev are let in. Needs a program that is built with
-    /// `--features foxglove`.
+    /// machine and of app.foxglove.dev are let in.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     foxglove: Option<u16>,
     /// Another page that may show the run, by its origin (`https://viewer.example`, `file://`).

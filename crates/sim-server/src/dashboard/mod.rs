@@ -40,10 +40,7 @@ use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::Instant;
 
-pub(crate) use access::AccessArgs;
-#[cfg(feature = "foxglove")]
-pub(crate) use access::is_this_computer;
-#[cfg(feature = "foxglove")]
+pub(crate) use access::{AccessArgs, is_this_computer};
 pub(crate) use api::carry_out;
 pub(crate) use hub::Hub;
 pub(crate) use metrics::Metrics;

@@ -302,7 +302,6 @@ impl Handle {
     }
 
     /// State and settings now; it tells when they change.
-    #[cfg(feature = "foxglove")]
     pub(crate) fn standing(&self) -> watch::Receiver<Standing> {
         self.standing.subscribe()
     }

@@ -64,11 +64,7 @@ fn a_bus_that_cannot_be_used_is_named() {
 }
 
 #[test]
-fn what_the_contract_names_and_this_version_lacks_says_so() {
-    if !cfg!(feature = "foxglove") {
-        let line = refused(&["run", "--headless", "--foxglove"]);
-        assert!(line.contains("--foxglove") && line.contains("--features foxglove"), "{line}");
-    }
+fn a_port_or_a_decider_that_cannot_be_is_named() {
     assert!(refused(&["run", "--headless", "--foxglove", "70000"]).contains("70000"));
     assert!(refused(&["run", "--headless", "--decider", "dqn:none.safetensors"]).contains("none"));
     assert!(refused(&["run", "--headless", "--decider", "dqn:"]).contains("dqn:FILE"));

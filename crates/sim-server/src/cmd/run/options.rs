@@ -11,7 +11,6 @@ use crate::listeners::Wanted;
 /// # Errors
 /// [`Failure::Input`] names the file and key, or the option that cannot be used.
 pub(super) fn scenario(args: &Args) -> Result<Scenario, Failure> {
-    networks(args).refuse_unbuilt()?;
     let mut scenario = Scenario::named(&args.scenario).map_err(Failure::input)?;
     let changes = Overrides {
         road: args.road.as_deref(),

@@ -1,0 +1,36 @@
+#!/usr/bin/env bash
+# In place of rustc for the crates of the workspace (RUSTC_WORKSPACE_WRAPPER): compiles one, then runs
+# clippy's lints and rustdoc over it, strictly. `cargo clippy` and `cargo doc` would check 400
+# dependencies anew, only to know of them what the build knows already. What is optimised are the
+# libraries: a test's own words are not what takes time, and a bench is only to be seen to link.
+set -euo pipefail
+rustc=$1
+shift
+all=" $* "
+documented=yes
+case $all in
+*" benches/"*) optimised=0 documented=no ;;
+*" --test "* | *" examples/"*) optimised=1 documented=no ;;
+*" --crate-name build_script_"*) documented=no ;;
+esac
+"$rustc" "$@" ${optimised:+-C opt-level=$optimised}
+# cargo also asks what the compiler is
+[[ $all == *" --emit="* && $all != *" --crate-name ___ "* ]] || exit 0
+
+into=$(mktemp -d)
+trap 'rm -rf "$into"' EXIT
+arguments=(--out-dir "$into")
+while [ $# -gt 0 ]; do
+  case $1 in
+  --emit=*) ;;
+  --out-dir) shift ;;
+  # else cargo would take what is made here for what it waits for
+  --json=*) arguments+=("${1/,artifacts/}") ;;
+  *) arguments+=("$1") ;;
+  esac
+  shift
+done
+clippy-driver rustc "${arguments[@]}" --emit=metadata -D warnings
+[ "$documented" = yes ] || exit 0
+[[ $all == *" --crate-type bin "* ]] && arguments+=(--document-private-items)
+rustdoc "${arguments[@]}" -D warnings -A rustdoc::private-intra-doc-links
