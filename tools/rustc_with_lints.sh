@@ -7,19 +7,22 @@ set -euo pipefail
 rustc=$1
 shift
 all=" $* "
-documented=yes
-case $all in
-*" benches/"*) optimised=0 documented=no ;;
-*" --test "* | *" examples/"*) optimised=1 documented=no ;;
-*" --crate-name build_script_"*) documented=no ;;
-esac
-"$rustc" "$@" ${optimised:+-C opt-level=$optimised}
 # cargo also asks what the compiler is
-[[ $all == *" --emit="* && $all != *" --crate-name ___ "* ]] || exit 0
+[[ $all == *" --emit="* && $all != *" --crate-name ___ "* ]] || exec "$rustc" "$@"
+linted=yes documented=no
+case $all in
+*" benches/"*) optimised=0 ;;
+*" --test "* | *" examples/"*) optimised=1 ;;
+*" --crate-name build_script_"*) ;;
+*" --crate-type cdylib "*) documented=yes ;;
+# linted with its unit tests, in which all of it is
+*) linted=no documented=yes ;;
+esac
+"$rustc" "$@" -D warnings ${optimised:+-C opt-level=$optimised}
 
 into=$(mktemp -d)
 trap 'rm -rf "$into"' EXIT
-arguments=(--out-dir "$into")
+arguments=(--out-dir "$into" -D warnings)
 while [ $# -gt 0 ]; do
   case $1 in
   --emit=*) ;;
@@ -30,7 +33,7 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-clippy-driver rustc "${arguments[@]}" --emit=metadata -D warnings
-[ "$documented" = yes ] || exit 0
+[ $linted = no ] || clippy-driver rustc "${arguments[@]}" --emit=metadata
+[ $documented = yes ] || exit 0
 [[ $all == *" --crate-type bin "* ]] && arguments+=(--document-private-items)
-rustdoc "${arguments[@]}" -D warnings -A rustdoc::private-intra-doc-links
+rustdoc "${arguments[@]}" -A rustdoc::private-intra-doc-links

@@ -11,7 +11,7 @@ use j1939::{AddressClaim, Frame, TpEvent, Transport};
 use tractrix_core::Time;
 
 /// Nothing takes longer than this, however busy the machine is.
-pub const PATIENCE: Duration = Duration::from_secs(40);
+pub const PATIENCE: Duration = Duration::from_secs(90);
 
 /// Our stack on a bus.
 pub struct Node<B> {

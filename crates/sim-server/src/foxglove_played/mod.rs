@@ -116,6 +116,9 @@ impl Deck {
         server: &WebSocketServerHandle,
         stop: &AtomicBool,
     ) -> Result<(), RecordingError> {
+        // Who came between the open door and here has not been told
+        let state = self.lock().state(self.wall(), false);
+        server.broadcast_playback_state(state);
         let mut next = None;
         let mut told: Option<(Duration, Time)> = None;
         while !stop.load(Ordering::Relaxed) {
