@@ -9,14 +9,12 @@ shift
 all=" $* "
 # cargo also asks what the compiler is
 [[ $all == *" --emit="* && $all != *" --crate-name ___ "* ]] || exec "$rustc" "$@"
-linted=yes documented=no
+documented=no
 case $all in
 *" benches/"*) optimised=0 ;;
 *" --test "* | *" examples/"*) optimised=1 ;;
 *" --crate-name build_script_"*) ;;
-*" --crate-type cdylib "*) documented=yes ;;
-# linted with its unit tests, in which all of it is
-*) linted=no documented=yes ;;
+*) documented=yes ;;
 esac
 "$rustc" "$@" -D warnings ${optimised:+-C opt-level=$optimised}
 
@@ -33,7 +31,7 @@ while [ $# -gt 0 ]; do
   esac
   shift
 done
-[ $linted = no ] || clippy-driver rustc "${arguments[@]}" --emit=metadata
+clippy-driver rustc "${arguments[@]}" --emit=metadata
 [ $documented = yes ] || exit 0
 [[ $all == *" --crate-type bin "* ]] && arguments+=(--document-private-items)
 rustdoc "${arguments[@]}" -A rustdoc::private-intra-doc-links

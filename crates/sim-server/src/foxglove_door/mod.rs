@@ -51,9 +51,11 @@ pub(crate) fn stamp(time: Time) -> PartialMetadata {
     PartialMetadata::with_log_time(nanoseconds(time))
 }
 
-/// An open door that leads nowhere yet.
+/// An open port behind which nobody answers yet.
 pub(crate) struct Door {
     listener: std::net::TcpListener,
+    /// Where the server behind it listens.
+    inner: Ipv4Addr,
     /// As it was asked for.
     port: u16,
 }
@@ -69,32 +71,43 @@ impl Door {
         let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, port));
         let listener = listener.map_err(|e| unusable(port, &e))?;
         listener.set_nonblocking(true).map_err(|e| unusable(port, &e))?;
-        Ok(Self { listener, port })
+        Ok(Self { listener, inner: hidden(), port })
     }
 
-    /// Starts a server behind it and lets viewers in, until the runtime ends. `pages` are origins
-    /// beside those of this computer and of Foxglove. Not to be called where the runtime runs.
+    /// Starts a server behind it, which no viewer reaches before [`Door::let_in`]: what listens to
+    /// viewers knows the server by then. Not to be called where the runtime runs.
     ///
     /// # Errors
     /// [`Failure::Input`]: the server cannot start.
-    pub(crate) fn serve(
-        self,
+    pub(crate) fn start(
+        &self,
         server: WebSocketServer,
-        pages: Vec<String>,
         runtime: &runtime::Handle,
     ) -> Result<WebSocketServerHandle, Failure> {
-        let Self { listener, port } = self;
+        let server = server.tokio_runtime(runtime).bind(self.inner.to_string(), 0);
+        let wrong = |e: FoxgloveError| Failure::Input(format!("--foxglove {}: {e}", self.port));
+        server.start_blocking().map_err(wrong)
+    }
+
+    /// Lets viewers in to the server behind it, until the runtime ends. `pages` are origins beside
+    /// those of this computer and of Foxglove.
+    ///
+    /// # Errors
+    /// [`Failure::Input`]: the port cannot be listened to.
+    pub(crate) fn let_in(
+        self,
+        server: &WebSocketServerHandle,
+        pages: Vec<String>,
+        runtime: &runtime::Handle,
+    ) -> Result<(), Failure> {
+        let Self { listener, inner, port } = self;
         let address = listener.local_addr().map_err(|e| unusable(port, &e))?;
-        let inner = hidden();
-        let server = server.tokio_runtime(runtime).bind(inner.to_string(), 0).start_blocking();
-        let wrong = |e: FoxgloveError| Failure::Input(format!("--foxglove {port}: {e}"));
-        let server = server.map_err(wrong)?;
         let entered = runtime.enter();
         let listener = TcpListener::from_std(listener).map_err(|e| unusable(port, &e))?;
         drop(entered);
         runtime.spawn(keep(listener, (inner, server.port()).into(), pages));
         output::note(&format!("foxglove: ws://{address}"));
-        Ok(server)
+        Ok(())
     }
 }
 

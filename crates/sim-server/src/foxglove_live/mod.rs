@@ -62,8 +62,9 @@ impl Live {
             .parameter_handler(Arc::new(Parameters::new(session.clone(), runtime.clone())))
             .listener(Arc::new(commands))
             .message_backlog_size(BACKLOG);
-        let server = Arc::new(door.serve(server, pages, runtime)?);
+        let server = Arc::new(door.start(server, runtime)?);
         runtime.spawn(parameters::tell(session.clone(), Arc::clone(&server)));
+        door.let_in(&server, pages, runtime)?;
         Ok(Self { server, channels, has_begun: AtomicBool::new(false) })
     }
 

@@ -82,8 +82,9 @@ pub(crate) fn serve(
         .playback_time_range(nanoseconds(span[0]), nanoseconds(span[1]))
         .listener(Arc::clone(&deck) as Arc<dyn ServerListener>)
         .message_backlog_size(BACKLOG);
-    let server = door.serve(server, pages, runtime)?;
+    let server = door.start(server, runtime)?;
     let server = deck.server.get_or_init(|| server);
+    door.let_in(server, pages, runtime)?;
     let played = deck.play(&mut player, server, stop);
     if let Err(why) = &played {
         server.publish_status(Status::error(why.to_string()));
@@ -116,9 +117,6 @@ impl Deck {
         server: &WebSocketServerHandle,
         stop: &AtomicBool,
     ) -> Result<(), RecordingError> {
-        // Who came between the open door and here has not been told
-        let state = self.lock().state(self.wall(), false);
-        server.broadcast_playback_state(state);
         let mut next = None;
         let mut told: Option<(Duration, Time)> = None;
         while !stop.load(Ordering::Relaxed) {

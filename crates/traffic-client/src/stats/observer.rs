@@ -125,8 +125,8 @@ impl Samples {
         self.driven_h * 3600.0 / self.duration_s.max(1e-9) / (lanes_m * 1e-3).max(1e-9)
     }
 
-    /// Mean flow (Edie, Proc. 2nd Int. Symp. on the Theory of Traffic Flow (1963) 139) on a road with this many metres of lanes, vehicles per hour
-    /// and lane.
+    /// Mean flow (Edie, Proc. 2nd Int. Symp. on the Theory of Traffic Flow (1963) 139) on a road with
+    /// this many metres of lanes, vehicles per hour and lane.
     #[must_use]
     pub fn flow_1_h(&self, lanes_m: f64) -> f64 {
         self.driven_km / (self.duration_s / 3600.0).max(1e-9) / (lanes_m * 1e-3).max(1e-9)
