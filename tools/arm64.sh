@@ -9,8 +9,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 target=aarch64-unknown-linux-gnu
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
-# neither the bits nor the drive depend on it, and compiling is what takes time here
-export CARGO_PROFILE_RELEASE_OPT_LEVEL=0
 
 log=$(mktemp)
 trap 'rm -f "$log" "$log.bin"' EXIT
