@@ -1,13 +1,15 @@
 //! Effects hidden in short generated drives are found, and nothing is found where nothing is. The
 //! full campaign (drives of 25 minutes, every cause) is `examples/campaign.rs`.
 
+use std::sync::LazyLock;
+
 use crate::support::effects::{Effect, Shape};
 use crate::support::outside::Outside;
 use crate::support::random::normal;
 use crate::support::{Campaign, generate, second};
 use diagnosis::{
     Baseline, Channel as C, Diagnosis, DiagnosisError, DriveSet, Options, Plant, Serial, Verdict,
-    diagnose, diagnose_with,
+    diagnose_with,
 };
 use dynamics::TruckParameters;
 use rand::SeedableRng;
@@ -19,10 +21,20 @@ fn drives(hidden: &[Effect], seed: u64) -> DriveSet {
     generate(hidden, &SHORT, seed)
 }
 
+fn plant() -> Plant {
+    Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap()
+}
+
+/// Learned once for all tests here.
+static IN_ORDER: LazyLock<Baseline> =
+    LazyLock::new(|| Baseline::learn(&plant(), &drives(&[], 900), &Serial).unwrap());
+
 fn judge(set: &DriveSet) -> Result<Diagnosis, DiagnosisError> {
-    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
-    let clean = drives(&[], 900);
-    diagnose(&plant, set, Some(&clean), &Options::default(), &Serial, &mut |_| {})
+    judge_with(set, &Options::default())
+}
+
+fn judge_with(set: &DriveSet, options: &Options) -> Result<Diagnosis, DiagnosisError> {
+    diagnose_with(&plant(), set, Some(&IN_ORDER), options, &Serial, &mut |_| {})
 }
 
 fn cause(id: &'static str, size: f64) -> Effect {
@@ -67,12 +79,10 @@ fn a_dead_time_of_the_steering_has_the_size_of_a_lag() {
 /// driveline, cold tyres like more rolling resistance.
 #[test]
 fn a_substitute_for_a_cause_that_the_catalogue_lacks_is_not_stated_as_sure() {
-    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
-    let clean = Baseline::learn(&plant, &drives(&[], 900), &Serial).unwrap();
     for (id, size) in [("mass", -0.1), ("tyre_warmup", 0.5)] {
         let set = drives(&[cause(id, size)], 43);
         let options = Options { excluded: vec![id.to_owned()], ..Options::default() };
-        let d = diagnose_with(&plant, &set, Some(&clean), &options, &Serial, &mut |_| {}).unwrap();
+        let d = judge_with(&set, &options).unwrap();
         assert_ne!(d.verdict, Verdict::Explained, "{id}: {:?}", d.causes);
     }
 }
@@ -97,8 +107,6 @@ fn drives_in_order_leave_nothing_to_explain_although_the_brakes_are_not_logged()
 /// drops out follows nothing, although every signal explains a little of so much noise.
 #[test]
 fn effects_outside_the_catalogue_are_unknown_with_their_signal() {
-    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
-    let clean = Baseline::learn(&plant, &drives(&[], 900), &Serial).unwrap();
     for (kind, size, quantity, signal) in [
         (Outside::FuelRpm, 0.2, "fuel_rate_g_s", "engine_speed_rpm"),
         (Outside::ShiftTemperature, 0.8, "shift_in_process", "coolant_temp_degc"),
@@ -106,8 +114,7 @@ fn effects_outside_the_catalogue_are_unknown_with_their_signal() {
         (Outside::GpsDropouts, 0.5, "gps_speed_m_s", "gps_speed_m_s"),
     ] {
         let set = drives(&[Effect::Outside { kind, size, shape: Shape([0.5; 4]) }], 31);
-        let options = Options::default();
-        let d = diagnose_with(&plant, &set, Some(&clean), &options, &Serial, &mut |_| {}).unwrap();
+        let d = judge(&set).unwrap();
         assert_eq!(d.verdict, Verdict::Unknown, "{kind:?} {:?}", d.causes);
         let unknown = d.unknown.unwrap();
         assert_eq!((unknown.quantity, unknown.signals[0]), (quantity, signal), "{kind:?}");
@@ -227,7 +234,7 @@ fn a_crosswind_is_found_wherever_it_acts() {
 /// wind with it, or hid it.
 #[test]
 fn where_the_winds_of_the_days_act_is_learned_from_the_baseline() {
-    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
+    let plant = plant();
     let short = Campaign { drives: 4, duration_s: 500.0, tolerance: 1.0 };
     let clean = second::generate(&[], &Campaign { drives: 8, ..short }, 562_250);
     let baseline = Baseline::learn(&plant, &clean, &Serial).unwrap();
@@ -274,7 +281,7 @@ fn with_a_map_that_errs(mut set: DriveSet, seed: u64) -> DriveSet {
 #[test]
 fn a_map_that_errs_does_not_make_its_shift_larger() {
     let campaign = Campaign { drives: 6, duration_s: 900.0, tolerance: 1.0 };
-    let plant = Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap();
+    let plant = plant();
     let of = |hidden: &[Effect], seed| {
         with_a_map_that_errs(generate(hidden, &campaign, seed), seed + 7000)
     };
