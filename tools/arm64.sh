@@ -9,6 +9,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 target=aarch64-unknown-linux-gnu
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64-static -L /usr/aarch64-linux-gnu"
+# the bits do not depend on it; not at all optimised, qemu is too slow for the drive's ticks
+export CARGO_PROFILE_RELEASE_OPT_LEVEL=1
 
 log=$(mktemp)
 trap 'rm -f "$log" "$log.bin"' EXIT
