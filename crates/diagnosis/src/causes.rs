@@ -95,7 +95,9 @@ impl Compared<'_> {
                     continue;
                 }
                 refitted.push(c.hypothesis);
-                let instead = evidence.with_added(fewer, &c, self.empty.norm);
+                // What is less likely than a rounding error needs no figure.
+                let least = self.fit.log_z + f64::EPSILON.ln();
+                let instead = evidence.with_added(fewer, &c, self.empty.norm, least);
                 let kept = instead.map(|fit| evidence.gate(fit, self.empty));
                 let kept = kept.filter(|fit| fit.set.contains(&c.hypothesis));
                 let Some(kept) = kept else { continue };

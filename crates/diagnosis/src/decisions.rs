@@ -67,10 +67,9 @@ pub(crate) const LONELY: f64 = 0.85;
 pub(crate) const EXPLAINED: f64 = 0.95;
 /// Evidence that a free function needs beside or instead of named causes, nats: clean.
 pub(crate) const UNKNOWN_EVIDENCE: f64 = 30.0;
-/// Evidence of a free function or a disturbance over that of causes above which it wins, 1.
+/// Evidence of a free function or a disturbance over that of causes above which it wins, 1. Where
+/// further causes would not come near it none are searched.
 pub(crate) const AHEAD: f64 = 1.15;
-/// The same above which no further causes are searched, 1: they would only patch.
-pub(crate) const HOPELESS: f64 = 2.0;
 /// Part of an evidence above which a linear gain ranks, 1: the half; in linear problems it is all. A set
 /// whose causes' gains are below it is sought without their order, a rival whose gain is above it is
 /// fitted.

@@ -106,6 +106,8 @@ struct Free {
     /// Places of those of the member that came last, if others were there before.
     newest: Vec<usize>,
     zero: Theta,
+    /// Cost that a fit must come below to be of use: its evidence is no more than the cost allows.
+    most_cost: f64,
 }
 
 impl Free {
@@ -125,14 +127,14 @@ impl Free {
             .iter()
             .map(|p| Prior { mean: zero[*p as usize], sigma: p.spec().prior })
             .collect();
-        Self { priors, params, sizes, shapes, newest, zero }
+        Self { priors, params, sizes, shapes, newest, zero, most_cost: f64::INFINITY }
     }
 
     /// Figures rather than causes, each with a prior of its own.
     fn figures(figures: &[(P, Prior)], zero: Theta) -> Self {
         let (params, priors) = figures.iter().copied().unzip();
         let (sizes, shapes, newest) = Default::default();
-        Self { params, priors, sizes, shapes, newest, zero }
+        Self { params, priors, sizes, shapes, newest, zero, most_cost: f64::INFINITY }
     }
 
     /// Squared residual and prior.
@@ -222,7 +224,20 @@ struct Standing {
 impl dyn Evidence + '_ {
     /// Fits the parameters of a set by Gauss-Newton with step halving, from `start`.
     pub(crate) fn fit(&self, set: &[usize], start: &Theta, zero_norm: f64) -> Option<Fit> {
-        self.fit_free(set, Free::of(set, *self.zero()), start, zero_norm)
+        self.fit_beyond(set, start, zero_norm, f64::NEG_INFINITY)
+    }
+
+    /// The same where only an evidence above `least` is of use: `None` once the steps that are left, each
+    /// as good as the last one, would not lead there.
+    pub(crate) fn fit_beyond(
+        &self,
+        set: &[usize],
+        start: &Theta,
+        zero_norm: f64,
+        least: f64,
+    ) -> Option<Fit> {
+        let free = Free { most_cost: zero_norm - 2.0 * least, ..Free::of(set, *self.zero()) };
+        self.fit_free(set, free, start, zero_norm)
     }
 
     /// Fits figures with priors of their own from where nothing is off.
@@ -236,7 +251,7 @@ impl dyn Evidence + '_ {
         let mut at = self.stand(&free, start, free.along(start))?;
         let mut improved = 0.0;
         let most = if free.params.is_empty() { 0 } else { MOST_STEPS };
-        for _ in 0..most {
+        for left in (0..most).rev() {
             let Some(step) = self.best_step(&free, &at)? else { break };
             let kept = (step.improved - step.promised).abs() <= KEPT_PROMISE * step.promised;
             // Tolerances that are taken where a fit is need to be taken where it ends.
@@ -244,6 +259,9 @@ impl dyn Evidence + '_ {
             let along = if kept && !there { at.along } else { free.along(&step.to) };
             at = self.stand(&free, &step.to, along)?;
             improved += step.improved;
+            if at.cost - left as f64 * step.improved > free.most_cost {
+                return None;
+            }
             if step.improved < 0.3 + 1e-5 * improved {
                 break;
             }

@@ -6,7 +6,7 @@
 //! cause, ten for a further one. What a helper would patch of the form of a large cause is in the
 //! score already ([`crate::course`]).
 
-use crate::decisions::{HOPELESS, MIN_EVIDENCE, MIN_FIRST, RANKED};
+use crate::decisions::{AHEAD, MIN_EVIDENCE, MIN_FIRST, RANKED};
 use crate::evidence::Evidence;
 use crate::hypothesis::{CATALOGUE, Hypothesis};
 use crate::param::{PARAMS, Spec, Theta};
@@ -23,7 +23,8 @@ const PAIRS: usize = 3;
 
 impl dyn Evidence + '_ {
     /// The best set of causes among `open`. `bare` is the evidence of the best free function: where
-    /// it stays far above that of two causes, others only patch what the catalogue does not have.
+    /// it wins even if every further cause added as much as the last one, others only patch what the
+    /// catalogue does not have.
     pub(crate) fn search(
         &self,
         open: &[usize],
@@ -42,13 +43,15 @@ impl dyn Evidence + '_ {
             if next.log_z - best.log_z < Self::threshold(&best) {
                 break;
             }
-            best = next;
-            if best.set.len() > 1 && bare > HOPELESS * best.log_z {
+            let before = best.log_z;
+            best = self.drop_and_swap(next, open, zero_norm);
+            // Causes add less and less.
+            let most = best.log_z + (max_causes - best.set.len()) as f64 * (best.log_z - before);
+            if best.set.len() > 1 && bare > AHEAD * most {
                 return Some((empty, best));
             }
-            best = self.drop_and_swap(best, open, zero_norm);
         }
-        if bare < HOPELESS * best.log_z
+        if bare <= AHEAD * best.log_z
             && let Some(better) = self.pair_step(&best, &empty, open, zero_norm)
         {
             best = self.drop_and_swap(better, open, zero_norm);
@@ -82,11 +85,8 @@ impl dyn Evidence + '_ {
             }
             tried.push(c.hypothesis);
             let from = to_all_sides(&CATALOGUE[c.hypothesis]);
-            if let Some(f) = self.with_added_from(empty, c, &from, zero_norm)
-                && f.log_z > winner.as_ref().map_or(best.log_z, |w| w.log_z)
-            {
-                winner = Some(f);
-            }
+            let least = winner.as_ref().map_or(best.log_z, |w| w.log_z);
+            winner = self.with_added_from(empty, c, &from, zero_norm, least).or(winner);
         }
         winner
     }
@@ -110,14 +110,11 @@ impl dyn Evidence + '_ {
                 Some((fewer, theta)) if !fewer.is_empty() => self.fit(&fewer, &theta, zero_norm)?,
                 _ => empty.clone(),
             };
-            let Some(one) = self.with_added(&there, &pair[0], zero_norm) else { continue };
-            let Some(both) = self.with_added(&one, &pair[1], zero_norm) else { continue };
-            let needed = if both.set.len() > best.set.len() { MIN_EVIDENCE } else { 1.0 };
-            if both.log_z > best.log_z + needed
-                && winner.as_ref().is_none_or(|w| both.log_z > w.log_z)
-            {
-                winner = Some(both);
-            }
+            let any = f64::NEG_INFINITY;
+            let Some(one) = self.with_added(&there, &pair[0], zero_norm, any) else { continue };
+            let needed = if one.set.len() == best.set.len() { MIN_EVIDENCE } else { 1.0 };
+            let least = winner.as_ref().map_or(best.log_z + needed, |w| w.log_z);
+            winner = self.with_added(&one, &pair[1], zero_norm, least).or(winner);
         }
         winner
     }
@@ -146,20 +143,24 @@ impl dyn Evidence + '_ {
                 continue;
             }
             tried.push(c.hypothesis);
-            if let Some(f) = self.with_added(best, c, zero_norm)
-                && winner.as_ref().is_none_or(|w| f.log_z > w.log_z)
-            {
-                winner = Some(f);
-            }
+            let least = winner.as_ref().map_or(best.log_z + Self::threshold(best), |w| w.log_z);
+            winner = self.with_added(best, c, zero_norm, least).or(winner);
         }
         winner
     }
 
     /// The set with a candidate added, fitted from its start; from all of its starts if its shape is
-    /// a switch, which a fit holds, or one that gets stuck.
-    pub(crate) fn with_added(&self, best: &Fit, c: &Candidate, zero_norm: f64) -> Option<Fit> {
+    /// a switch, which a fit holds, or one that gets stuck. `None` where its evidence is not above
+    /// `least`.
+    pub(crate) fn with_added(
+        &self,
+        best: &Fit,
+        c: &Candidate,
+        zero_norm: f64,
+        least: f64,
+    ) -> Option<Fit> {
         let sides = sides(&CATALOGUE[c.hypothesis], &c.sizes);
-        self.with_added_from(best, c, &sides, zero_norm)
+        self.with_added_from(best, c, &sides, zero_norm, least)
     }
 
     /// The same from given sizes.
@@ -169,6 +170,7 @@ impl dyn Evidence + '_ {
         c: &Candidate,
         sides: &[Vec<f64>],
         zero_norm: f64,
+        least: f64,
     ) -> Option<Fit> {
         let hyp = &CATALOGUE[c.hypothesis];
         let starts = if hyp.shapes.iter().any(|p| p.is_switch() || p.is_stuck()) {
@@ -178,8 +180,8 @@ impl dyn Evidence + '_ {
         };
         let mut set = best.set.clone();
         set.push(c.hypothesis);
-        let fits = starts.iter().flat_map(|start| sides.iter().map(move |sizes| (start, sizes)));
-        let fits = fits.filter_map(|(start, sizes)| {
+        let mut found: Option<Fit> = None;
+        for (start, sizes) in starts.iter().flat_map(|s| sides.iter().map(move |x| (s, x))) {
             let mut theta = best.theta;
             for (p, start) in hyp.shapes.iter().zip(start) {
                 theta[*p as usize] = *start;
@@ -187,9 +189,13 @@ impl dyn Evidence + '_ {
             for (p, size) in hyp.sizes.iter().zip(sizes) {
                 theta[*p as usize] = self.zero()[*p as usize] + size;
             }
-            self.fit(&set, &theta, zero_norm)
-        });
-        fits.max_by(|x, y| x.log_z.total_cmp(&y.log_z))
+            let least = found.as_ref().map_or(least, |f| f.log_z);
+            found = self
+                .fit_beyond(&set, &theta, zero_norm, least)
+                .filter(|f| f.log_z > least)
+                .or(found);
+        }
+        found
     }
 
     /// Drops members that no longer pay, then tries another hypothesis in every place.
@@ -216,9 +222,8 @@ impl dyn Evidence + '_ {
                         if f.log_z + c.gain < best.log_z - 20.0 - 0.1 * (best.log_z - f.log_z) {
                             continue;
                         }
-                        if let Some(s) = self.with_added(&f, c, zero_norm)
-                            && s.log_z > best.log_z + 1.0
-                        {
+                        let least = best.log_z + 1.0;
+                        if let Some(s) = self.with_added(&f, c, zero_norm, least) {
                             (best, screen) = (s, None);
                             changed = true;
                             break;

@@ -83,6 +83,39 @@ fn of_a_collinear_pair_one_is_found_and_the_other_says_as_much() {
     assert!((fit.log_z - gain).abs() < 3.0, "{} {gain}", fit.log_z);
 }
 
+/// A force without a name took a minute: each further cause patched a little more of it, and in the end
+/// a function won over all of them.
+#[test]
+fn the_search_ends_where_a_function_wins_over_whatever_may_follow() {
+    let columns = [(P::Rolling, 1, 0.4), (P::Drag, 2, 0.2), (P::Mass, 3, 0.1)]
+        .map(|(p, k, size)| ((p, times(&wave(k), STRONG)), size));
+    let residual = columns.iter().map(|((_, x), size)| times(x, *size));
+    let residual = residual.reduce(|a, b| plus(&a, &b)).unwrap();
+    let problem = alike(6, &residual, &columns.map(|x| x.0));
+    let open = [ROLLING, DRAG, "mass"].map(LinearProblem::cause);
+    let evidence: &dyn Evidence = &problem;
+    let found = |bare| evidence.search(&open, 4, bare, &mut |_| {}).unwrap().1;
+    let all = found(0.0);
+    assert_eq!(all.set.len(), 3);
+    // Two causes say 960 nats, the second one 192 of them: two more may bring 1,344.
+    assert_eq!(found(2000.0).set, all.set[..2]);
+    assert_eq!(found(1400.0).set, all.set);
+}
+
+#[test]
+fn a_fit_that_would_not_say_enough_is_given_up() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let problem = alike(6, &times(&columns[0].1, 0.3), &columns);
+    let evidence: &dyn Evidence = &problem;
+    let (set, zero) = ([LinearProblem::cause(ROLLING)], *evidence.zero());
+    let norm = evidence.gram(&zero, &[]).sum(|_| true).2;
+    let fit = evidence.fit(&set, &zero, norm).unwrap();
+    let beyond = |least| evidence.fit_beyond(&set, &zero, norm, least);
+    let kept = beyond(0.9 * fit.log_z).unwrap();
+    assert_eq!((kept.log_z, kept.theta), (fit.log_z, fit.theta));
+    assert!(beyond(1.1 * fit.log_z).is_none());
+}
+
 /// Rows times what grows evenly from -1 to 1 over them.
 fn growing(x: &[f64]) -> Vec<f64> {
     let place = |i: usize| 2.0 * i as f64 / (ROWS - 1) as f64 - 1.0;
