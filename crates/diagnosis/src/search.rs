@@ -40,15 +40,12 @@ impl dyn Evidence + '_ {
         while best.set.len() < max_causes {
             progress(best.set.len());
             let Some(next) = self.step(&best, open, zero_norm) else { break };
-            if next.log_z - best.log_z < Self::threshold(&best) {
-                break;
-            }
             let before = best.log_z;
             best = self.drop_and_swap(next, open, zero_norm);
             // Causes add less and less.
             let most = best.log_z + (max_causes - best.set.len()) as f64 * (best.log_z - before);
             if best.set.len() > 1 && bare > AHEAD * most {
-                return Some((empty, best));
+                break;
             }
         }
         if bare <= AHEAD * best.log_z
@@ -110,9 +107,11 @@ impl dyn Evidence + '_ {
                 Some((fewer, theta)) if !fewer.is_empty() => self.fit(&fewer, &theta, zero_norm)?,
                 _ => empty.clone(),
             };
-            let any = f64::NEG_INFINITY;
-            let Some(one) = self.with_added(&there, &pair[0], zero_norm, any) else { continue };
-            let needed = if one.set.len() == best.set.len() { MIN_EVIDENCE } else { 1.0 };
+            // The first of them alone may be worth nothing.
+            let Some(one) = self.with_added(&there, &pair[0], zero_norm, f64::NEG_INFINITY) else {
+                continue;
+            };
+            let needed = if one.set.len() >= best.set.len() { MIN_EVIDENCE } else { 1.0 };
             let least = winner.as_ref().map_or(best.log_z + needed, |w| w.log_z);
             winner = self.with_added(&one, &pair[1], zero_norm, least).or(winner);
         }
@@ -124,6 +123,7 @@ impl dyn Evidence + '_ {
         if best.set.is_empty() { MIN_FIRST } else { MIN_EVIDENCE }
     }
 
+    /// The set with the cause that says most beyond it, if that is enough.
     fn step(&self, best: &Fit, open: &[usize], zero_norm: f64) -> Option<Fit> {
         let candidates = self.screen(best, &outside(best, open)).singles(None);
         let top = candidates.first()?.gain;

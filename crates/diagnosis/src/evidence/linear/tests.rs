@@ -1,6 +1,7 @@
 //! What the search makes of evidence that is known exactly.
 
 use super::*;
+use crate::decisions::MIN_EVIDENCE;
 use crate::refit::Fit;
 
 mod gate;
@@ -100,6 +101,26 @@ fn the_search_ends_where_a_function_wins_over_whatever_may_follow() {
     // Two causes say 960 nats, the second one 192 of them: two more may bring 1,344.
     assert_eq!(found(2000.0).set, all.set[..2]);
     assert_eq!(found(1400.0).set, all.set);
+}
+
+/// Where one cause alone says nothing, two must say as much as another one would have to.
+#[test]
+fn two_causes_that_say_little_are_no_more_found_than_one() {
+    let near =
+        |sign: f64| plus(&times(&wave(1), 0.995 * STRONG), &times(&wave(2), sign * 0.1 * STRONG));
+    let columns = [(P::Rolling, near(1.0)), (P::Drag, near(-1.0))];
+    let open = [ROLLING, DRAG].map(LinearProblem::cause);
+    let of = |residual: f64| {
+        let problem = alike(6, &times(&wave(2), residual), &columns);
+        let evidence: &dyn Evidence = &problem;
+        let zero = *evidence.zero();
+        let norm = evidence.gram(&zero, &[]).sum(|_| true).2;
+        let both = evidence.fit(&open, &zero, norm).unwrap().log_z;
+        (both, evidence.search(&open, 4, 0.0, &mut |_| {}).unwrap().1.set.len())
+    };
+    let [(little, none), (much, two)] = [of(2.0), of(4.0)];
+    assert!((1.0..MIN_EVIDENCE).contains(&little) && much > MIN_EVIDENCE, "{little} {much}");
+    assert_eq!([none, two], [0, 2]);
 }
 
 #[test]
