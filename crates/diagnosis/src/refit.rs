@@ -106,8 +106,6 @@ struct Free {
     /// Places of those of the member that came last, if others were there before.
     newest: Vec<usize>,
     zero: Theta,
-    /// Cost that a fit must come below to be of use: its evidence is no more than the cost allows.
-    most_cost: f64,
 }
 
 impl Free {
@@ -127,14 +125,14 @@ impl Free {
             .iter()
             .map(|p| Prior { mean: zero[*p as usize], sigma: p.spec().prior })
             .collect();
-        Self { priors, params, sizes, shapes, newest, zero, most_cost: f64::INFINITY }
+        Self { priors, params, sizes, shapes, newest, zero }
     }
 
     /// Figures rather than causes, each with a prior of its own.
     fn figures(figures: &[(P, Prior)], zero: Theta) -> Self {
         let (params, priors) = figures.iter().copied().unzip();
         let (sizes, shapes, newest) = Default::default();
-        Self { params, priors, sizes, shapes, newest, zero, most_cost: f64::INFINITY }
+        Self { params, priors, sizes, shapes, newest, zero }
     }
 
     /// Squared residual and prior.
@@ -236,22 +234,28 @@ impl dyn Evidence + '_ {
         zero_norm: f64,
         least: f64,
     ) -> Option<Fit> {
-        let free = Free { most_cost: zero_norm - 2.0 * least, ..Free::of(set, *self.zero()) };
-        self.fit_free(set, free, start, zero_norm)
+        self.fit_free(set, Free::of(set, *self.zero()), start, zero_norm, least)
     }
 
     /// Fits figures with priors of their own from where nothing is off.
     pub(crate) fn fit_figures(&self, figures: &[(P, Prior)]) -> Option<Fit> {
         let zero = *self.zero();
         let norm = self.gram(&zero, &[]).sum(|_| true).2;
-        self.fit_free(&[], Free::figures(figures, zero), &zero, norm)
+        self.fit_free(&[], Free::figures(figures, zero), &zero, norm, f64::NEG_INFINITY)
     }
 
-    fn fit_free(&self, set: &[usize], free: Free, start: &Theta, zero_norm: f64) -> Option<Fit> {
+    fn fit_free(
+        &self,
+        set: &[usize],
+        free: Free,
+        start: &Theta,
+        zero_norm: f64,
+        least: f64,
+    ) -> Option<Fit> {
         let mut at = self.stand(&free, start, free.along(start))?;
         let mut improved = 0.0;
-        let most = if free.params.is_empty() { 0 } else { MOST_STEPS };
-        for left in (0..most).rev() {
+        let steps = if free.params.is_empty() { 0 } else { MOST_STEPS };
+        for left in (0..steps).rev() {
             let Some(step) = self.best_step(&free, &at)? else { break };
             let kept = (step.improved - step.promised).abs() <= KEPT_PROMISE * step.promised;
             // Tolerances that are taken where a fit is need to be taken where it ends.
@@ -259,7 +263,9 @@ impl dyn Evidence + '_ {
             let along = if kept && !there { at.along } else { free.along(&step.to) };
             at = self.stand(&free, &step.to, along)?;
             improved += step.improved;
-            if at.cost - left as f64 * step.improved > free.most_cost {
+            // What the determinant takes from it comes on top.
+            let most = 0.5 * (zero_norm - at.cost + left as f64 * step.improved);
+            if most < least {
                 return None;
             }
             if step.improved < 0.3 + 1e-5 * improved {
