@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::course::Course;
 use crate::evidence::Evidence;
 use crate::hypothesis::CATALOGUE;
-use crate::param::{P, Theta};
+use crate::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, moves};
 use crate::stats::evidence;
 
@@ -157,6 +157,13 @@ impl Free {
         Normal { a, b }
     }
 
+    /// Covariance and evidence where a fit stands (Laplace).
+    fn laplace(&self, at: &Standing, zero_norm: f64) -> Option<(DMatrix<f64>, f64)> {
+        let sigma: Vec<f64> = self.priors.iter().map(|p| p.sigma).collect();
+        let (covariance, log_det) = evidence::posterior(&at.gram.total().0, &sigma)?;
+        Some((covariance, 0.5 * (zero_norm - at.cost) - 0.5 * log_det))
+    }
+
     /// A step whose shapes move no further than their secants serve.
     fn limited(&self, mut step: DVector<f64>) -> DVector<f64> {
         for (p, d) in self.params.iter().zip(step.iter_mut()) {
@@ -209,6 +216,34 @@ struct Along {
     course: Course,
 }
 
+/// What a fit has to beat, and where fits of the same set have ended.
+pub(crate) struct Beyond {
+    pub(crate) least: f64,
+    ended: Vec<Theta>,
+}
+
+impl Beyond {
+    /// Only an evidence above `least` is of use.
+    pub(crate) fn evidence(least: f64) -> Self {
+        Self { least, ended: Vec::new() }
+    }
+
+    /// Whether a fit has ended within a standard deviation of a point: another one that comes there
+    /// would end there too. `a` is the information about the parameters.
+    fn is_known(&self, free: &Free, a: &DMatrix<f64>, to: &Theta) -> bool {
+        self.ended.iter().any(|there| {
+            let elsewhere =
+                |i: usize| to[i] != there[i] && free.params.iter().all(|p| *p as usize != i);
+            if (0..PARAMS).any(elsewhere) {
+                return false;
+            }
+            let away = free.params.iter().map(|p| to[*p as usize] - there[*p as usize]);
+            let away = DVector::from_iterator(free.params.len(), away);
+            (a * &away).dot(&away) < 1.0
+        })
+    }
+}
+
 /// Where a fit stands.
 struct Standing {
     theta: Theta,
@@ -222,26 +257,31 @@ struct Standing {
 impl dyn Evidence + '_ {
     /// Fits the parameters of a set by Gauss-Newton with step halving, from `start`.
     pub(crate) fn fit(&self, set: &[usize], start: &Theta, zero_norm: f64) -> Option<Fit> {
-        self.fit_beyond(set, start, zero_norm, f64::NEG_INFINITY)
+        self.fit_beyond(set, start, zero_norm, &mut Beyond::evidence(f64::NEG_INFINITY))
     }
 
-    /// The same where only an evidence above `least` is of use: `None` once the steps that are left, each
-    /// as good as the last one, would not lead there.
+    /// The same where only an evidence beyond another is of use: `None` once the steps that are left,
+    /// each as good as the last one, would not lead there, or one leads to where a fit has ended. What
+    /// is found has to be beaten by the next.
     pub(crate) fn fit_beyond(
         &self,
         set: &[usize],
         start: &Theta,
         zero_norm: f64,
-        least: f64,
+        beyond: &mut Beyond,
     ) -> Option<Fit> {
-        self.fit_free(set, Free::of(set, *self.zero()), start, zero_norm, least)
+        let fit = self.fit_free(set, Free::of(set, *self.zero()), start, zero_norm, beyond)?;
+        let is_better = fit.log_z > beyond.least;
+        beyond.least = beyond.least.max(fit.log_z);
+        is_better.then_some(fit)
     }
 
     /// Fits figures with priors of their own from where nothing is off.
     pub(crate) fn fit_figures(&self, figures: &[(P, Prior)]) -> Option<Fit> {
         let zero = *self.zero();
         let norm = self.gram(&zero, &[]).sum(|_| true).2;
-        self.fit_free(&[], Free::figures(figures, zero), &zero, norm, f64::NEG_INFINITY)
+        let mut beyond = Beyond::evidence(f64::NEG_INFINITY);
+        self.fit_free(&[], Free::figures(figures, zero), &zero, norm, &mut beyond)
     }
 
     fn fit_free(
@@ -250,29 +290,34 @@ impl dyn Evidence + '_ {
         free: Free,
         start: &Theta,
         zero_norm: f64,
-        least: f64,
+        beyond: &mut Beyond,
     ) -> Option<Fit> {
         let mut at = self.stand(&free, start, free.along(start))?;
         let mut improved = 0.0;
         let steps = if free.params.is_empty() { 0 } else { MOST_STEPS };
         for left in (0..steps).rev() {
-            let Some(step) = self.best_step(&free, &at)? else { break };
+            let normal = free.normal(&at.gram, &at.theta);
+            let Some(step) = self.best_step(&free, &at, &normal)? else { break };
+            if beyond.is_known(&free, &normal.a, &step.to) {
+                return None;
+            }
             let kept = (step.improved - step.promised).abs() <= KEPT_PROMISE * step.promised;
             // Tolerances that are taken where a fit is need to be taken where it ends.
             let there = free.params.iter().any(|p| moves(*p));
             let along = if kept && !there { at.along } else { free.along(&step.to) };
             at = self.stand(&free, &step.to, along)?;
             improved += step.improved;
-            // What the determinant takes from it comes on top.
-            let most = 0.5 * (zero_norm - at.cost + left as f64 * step.improved);
-            if most < least {
+            let most = |(_, log_z): (_, f64)| log_z + 0.5 * left as f64 * step.improved;
+            if free.laplace(&at, zero_norm).map(most).is_some_and(|z| z < beyond.least) {
+                beyond.ended.push(at.theta);
                 return None;
             }
             if step.improved < 0.3 + 1e-5 * improved {
                 break;
             }
         }
-        self.fitted(set, free, at, zero_norm)
+        beyond.ended.push(at.theta);
+        Self::fitted(set, free, at, zero_norm)
     }
 
     /// Gram matrix over residual and parameters, the courses of sizes of `at` taken out, and the
@@ -291,8 +336,7 @@ impl dyn Evidence + '_ {
 
     /// The common step with halving, or the newest member's alone where that leads further; none
     /// where nothing improves. The outer `None`: the normal equations cannot be solved.
-    fn best_step(&self, free: &Free, at: &Standing) -> Option<Option<Step>> {
-        let normal = free.normal(&at.gram, &at.theta);
+    fn best_step(&self, free: &Free, at: &Standing, normal: &Normal) -> Option<Option<Step>> {
         let (a, b) = (&normal.a, &normal.b);
         let tried = |step: &DVector<f64>, factor: f64| {
             let to = free.moved(&at.theta, step, factor);
@@ -303,7 +347,7 @@ impl dyn Evidence + '_ {
             let promised = 2.0 * factor * b.dot(step) - factor * factor * curve;
             Step { to, improved: at.cost - cost, promised }
         };
-        let step = free.limited(free.solved(&normal, &at.theta)?);
+        let step = free.limited(free.solved(normal, &at.theta)?);
         let mut found =
             HALVINGS.iter().map(|factor| tried(&step, *factor)).find(|s| s.improved > 0.0);
         let poor = found.is_none_or(|s| s.improved < BROKEN_PROMISE * b.dot(&step));
@@ -321,15 +365,14 @@ impl dyn Evidence + '_ {
         Some(found)
     }
 
-    /// Evidence and covariance where a fit has ended (Laplace).
-    fn fitted(&self, set: &[usize], free: Free, at: Standing, zero_norm: f64) -> Option<Fit> {
-        let (a, _, norm) = at.gram.total();
-        let sigma: Vec<f64> = free.priors.iter().map(|p| p.sigma).collect();
-        let (covariance, log_det) = evidence::posterior(&a, &sigma)?;
+    /// What a fit that has ended says.
+    fn fitted(set: &[usize], free: Free, at: Standing, zero_norm: f64) -> Option<Fit> {
+        let (covariance, log_z) = free.laplace(&at, zero_norm)?;
+        let norm = at.gram.total().2;
         Some(Fit {
             set: set.to_vec(),
             theta: at.theta,
-            log_z: 0.5 * (zero_norm - at.cost) - 0.5 * log_det,
+            log_z,
             free: free.params,
             priors: free.priors,
             covariance,

@@ -10,7 +10,7 @@ use crate::decisions::{AHEAD, MIN_EVIDENCE, MIN_FIRST, RANKED};
 use crate::evidence::Evidence;
 use crate::hypothesis::{CATALOGUE, Hypothesis};
 use crate::param::{PARAMS, Spec, Theta};
-use crate::refit::Fit;
+use crate::refit::{Beyond, Fit};
 use crate::replay::affects;
 use crate::screen::{Candidate, Screen, outside};
 
@@ -180,6 +180,7 @@ impl dyn Evidence + '_ {
         };
         let mut set = best.set.clone();
         set.push(c.hypothesis);
+        let mut beyond = Beyond::evidence(least);
         let mut found: Option<Fit> = None;
         for (start, sizes) in starts.iter().flat_map(|s| sides.iter().map(move |x| (s, x))) {
             let mut theta = best.theta;
@@ -189,11 +190,7 @@ impl dyn Evidence + '_ {
             for (p, size) in hyp.sizes.iter().zip(sizes) {
                 theta[*p as usize] = self.zero()[*p as usize] + size;
             }
-            let least = found.as_ref().map_or(least, |f| f.log_z);
-            found = self
-                .fit_beyond(&set, &theta, zero_norm, least)
-                .filter(|f| f.log_z > least)
-                .or(found);
+            found = self.fit_beyond(&set, &theta, zero_norm, &mut beyond).or(found);
         }
         found
     }

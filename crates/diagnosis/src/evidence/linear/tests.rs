@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::decisions::MIN_EVIDENCE;
-use crate::refit::Fit;
+use crate::refit::{Beyond, Fit};
 
 mod gate;
 
@@ -131,10 +131,35 @@ fn a_fit_that_would_not_say_enough_is_given_up() {
     let (set, zero) = ([LinearProblem::cause(ROLLING)], *evidence.zero());
     let norm = evidence.gram(&zero, &[]).sum(|_| true).2;
     let fit = evidence.fit(&set, &zero, norm).unwrap();
-    let beyond = |least| evidence.fit_beyond(&set, &zero, norm, least);
+    let beyond = |least| evidence.fit_beyond(&set, &zero, norm, &mut Beyond::evidence(least));
     let kept = beyond(0.9 * fit.log_z).unwrap();
     assert_eq!((kept.log_z, kept.theta), (fit.log_z, fit.theta));
     assert!(beyond(1.1 * fit.log_z).is_none());
+}
+
+/// A wind was fitted from five sides to the end, though most of them led to the same place.
+#[test]
+fn a_fit_from_another_side_ends_where_it_comes_to_where_one_has_ended() {
+    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let residual = plus(&times(&columns[0].1, 0.3), &times(&columns[1].1, 0.1));
+    let problem = alike(6, &residual, &columns);
+    let evidence: &dyn Evidence = &problem;
+    let (set, zero) = ([LinearProblem::cause(ROLLING)], *evidence.zero());
+    let norm = evidence.gram(&zero, &[]).sum(|_| true).2;
+    let from = |start, beyond: &mut _| evidence.fit_beyond(&set, start, norm, beyond);
+    let mut other_side = zero;
+    other_side[P::Rolling as usize] = 0.5;
+    // Nothing has to be beaten in any of these but the place.
+    let nothing = || Beyond::evidence(f64::NEG_INFINITY);
+    assert!(from(&other_side, &mut nothing()).is_some());
+    let mut known = nothing();
+    assert!(from(&zero, &mut known).is_some());
+    known.least = f64::NEG_INFINITY;
+    assert!(from(&other_side, &mut known).is_none());
+    // The same size beside another figure that the fit holds is another place, and a better one.
+    let mut elsewhere = other_side;
+    elsewhere[P::Drag as usize] = 0.1;
+    assert!(from(&elsewhere, &mut known).is_some());
 }
 
 /// Rows times what grows evenly from -1 to 1 over them.
