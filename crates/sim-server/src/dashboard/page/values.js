@@ -16,10 +16,13 @@ const shown = (value) => typeof value === "number" ? String(Math.round(value * 1
 
 export class Values {
   constructor(list, vehicle, view) {
-    Object.assign(this, { list, vehicle, view, cells: null, id: null });
+    Object.assign(this, { list, vehicle, view, cells: null, id: null, frame: null });
+    // A run that stands still brings no frame after the list is opened.
+    list.parentElement.addEventListener("toggle", () => { if (this.frame) this.show(this.frame); });
   }
 
   show(frame) {
+    this.frame = frame;
     if (this.list.parentElement.open) this.showTruck(frame.ego);
     this.showVehicle(frame);
   }
