@@ -131,6 +131,10 @@ def test_a_run_that_is_over_is_played_back(
     # The list was empty until the next frame came, which a run that stands still does not bring.
     page.click("text=All values of the truck")
     expect(page.locator("#values")).to_contain_text("engine torque")
+    before = page.inner_text("#values")
+    page.fill("#at", "20")
+    other = "before => document.getElementById('values').innerText !== before"
+    page.wait_for_function(other, arg=before)
     page.fill("#at", "40")
     expect(page.locator("#time")).to_have_text("0:40.0")
     page.locator("#over >> text=time").click()

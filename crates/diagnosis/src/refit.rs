@@ -218,6 +218,7 @@ struct Along {
 
 /// What a fit has to beat, and where fits of the same set have ended.
 pub(crate) struct Beyond {
+    /// Evidence, nats.
     pub(crate) least: f64,
     ended: Vec<Theta>,
 }
