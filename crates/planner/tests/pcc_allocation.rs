@@ -26,8 +26,7 @@ fn after_the_first_solve_neither_linearisation_nor_solution_allocates() {
     let (mut sub, mut solver, mut found) =
         (Subproblem::default(), Structured::default(), Solution::default());
     let mut solve = |e: &[f64], terminal: Terminal, time: TimeRule| {
-        let point =
-            Linearisation { e_j_kg: e, gears, beta_g_s: 3.0, cut: CutModel::Hull, fit_frac: 1.0 };
+        let point = Linearisation { e_j_kg: e, gears, beta_g_s: 3.0, cut: CutModel::Hull };
         sub.linearise(truck, course, &trip.tuning, &point);
         sub.e_max.copy_from_slice(&trip.e_max);
         for (low, e) in sub.e_min.iter_mut().zip(e) {

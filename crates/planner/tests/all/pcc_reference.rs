@@ -71,7 +71,7 @@ fn plans_are_as_good_as_dynamic_programming_on_a_few_short_roads() {
         let start = profile[0].s_m;
         let profile: Vec<ProfilePoint> =
             profile.into_iter().take_while(|p| p.s_m <= start + length_m).collect();
-        for engine in [Engine::Continuous, Engine::BenchMap] {
+        for engine in [Engine::Continuous, Engine::BenchMap, Engine::Measured] {
             let limits = truck(mass, engine);
             let (band_km_h, eco_roll) = (BANDS_KM_H[1], false);
             let case = Case { name, profile: &profile, limits: &limits, band_km_h, eco_roll };

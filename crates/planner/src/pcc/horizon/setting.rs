@@ -179,7 +179,6 @@ impl Setting {
             fence_s: None,
             start_gear: None,
             cut: CutModel::Charged,
-            fit_frac: 1.0,
             forced_cut: Vec::new(),
             may_roll: Vec::new(),
         }

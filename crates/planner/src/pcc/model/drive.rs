@@ -253,7 +253,7 @@ pub(crate) fn coast_energy(truck: &Truck, course: &Course, k: usize, drive: Driv
 }
 
 /// Injection below this specific traction at a planned cut-off is the solver's rounding, m/s².
-const CUT_ROUNDING: f64 = 4e-4;
+pub(crate) const CUT_ROUNDING: f64 = 4e-4;
 
 /// Drives a whole profile of target energies (one per node) in the given gears. Where a target is
 /// out of reach the truck does what it can and catches up later. `cut` marks intervals planned at

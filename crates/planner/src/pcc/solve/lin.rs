@@ -22,7 +22,7 @@
 
 use alloc::vec::Vec;
 
-use super::fit::{FuelCosts, Parabola};
+use super::parabola::Parabola;
 use super::sqp::CutModel;
 use crate::pcc::model::{Course, Drive, Operating, Truck, Tuning, duration_s};
 
@@ -62,9 +62,6 @@ pub struct Linearisation<'a> {
     pub beta_g_s: f64,
     /// How part load below zero wheel force is charged.
     pub cut: CutModel,
-    /// Part of the tractions above zero wheel force, around the profile's own, over which the fuel
-    /// map is taken to be a parabola; 1: all of them.
-    pub fit_frac: f64,
 }
 
 /// One convex subproblem. Vectors are per interval unless the name says node; reused between
@@ -165,7 +162,7 @@ impl Subproblem {
         tuning: &Tuning,
         point: &Linearisation<'_>,
     ) {
-        let Linearisation { e_j_kg: e, gears, beta_g_s, cut, fit_frac } = *point;
+        let Linearisation { e_j_kg: e, gears, beta_g_s, cut } = *point;
         let (n, h) = (course.n(), course.h_m);
         self.resize(n);
         self.h_m = h;
@@ -195,7 +192,7 @@ impl Subproblem {
                 - resistance_slope * mean;
             let p = (self.a0[k] * e[k] + self.a1[k] * e[k + 1] + self.r[k]).max(0.0);
             match &around {
-                Some(around) => self.traction_and_fuel(around, k, p, cut, fit_frac),
+                Some(around) => self.traction_and_fuel(around, k, p, cut),
                 None => self.rolling(truck.idle_fuel_g_s(), k, v),
             }
             q_typical += self.q1[k];
@@ -222,14 +219,7 @@ impl Subproblem {
         self.discount[k] = LEAST_DISCOUNT * h;
     }
 
-    fn traction_and_fuel(
-        &mut self,
-        around: &Around<'_>,
-        k: usize,
-        p: f64,
-        cut: CutModel,
-        fit_frac: f64,
-    ) {
+    fn traction_and_fuel(&mut self, around: &Around<'_>, k: usize, p: f64, cut: CutModel) {
         let h = self.h_m;
         let Around { v, v_low, v_high, d_e, here, low, high } = around;
         let per_interval = |v: f64, at: &Operating<'_>, p: f64| h / v * at.fuel_charged_g_s(p);
@@ -249,16 +239,9 @@ impl Subproblem {
             CutModel::Charged => fuel(0.0),
         };
         let below = (first_g - zero) / kink;
-        let mut costs = FuelCosts { q1, q2, kink, below };
-        if fit_frac < 1.0 {
-            let half = 0.5 * fit_frac * (phi - kink);
-            let hull = |p: f64| if p < kink { fuel(p).min(zero + below * p) } else { fuel(p) };
-            let first = (p - half).min(phi - 2.0 * half);
-            costs = costs.near(hull, first, half);
-        }
-        let above = costs.q1 + costs.q2 * costs.kink;
-        (self.q1[k], self.q2[k], self.kink[k]) = (costs.q1, costs.q2, costs.kink);
-        self.discount[k] = (above - costs.below).max(LEAST_DISCOUNT * above);
+        let above = q1 + q2 * kink;
+        (self.q1[k], self.q2[k], self.kink[k]) = (q1, q2, kink);
+        self.discount[k] = (above - below).max(LEAST_DISCOUNT * above);
     }
 
     /// Leaves marked intervals (empty: none) no traction beyond the solver's interior.

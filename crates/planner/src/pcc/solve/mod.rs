@@ -3,7 +3,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `lin`, `quadratic` | the convex subproblem |
-//! | `fit` | an interval's fuel over traction: a parabola and a kink |
+//! | `parabola` | an interval's fuel over traction, above zero wheel force |
 //! | `solution` | what a solver returns |
 //! | `structured` | its solution by a banded interior-point method, without a library |
 //! | `programme`, `clarabel` | its solution by Clarabel |
@@ -14,8 +14,8 @@
 #[cfg(feature = "solver")]
 pub mod clarabel;
 pub(crate) mod eco_roll;
-mod fit;
 mod lin;
+mod parabola;
 #[cfg(feature = "solver")]
 mod programme;
 mod quadratic;

@@ -44,9 +44,6 @@ pub struct Problem<'a> {
     pub start_gear: Option<Drive>,
     /// How part load between fuel cut-off and zero wheel force is charged.
     pub cut: CutModel,
-    /// Part of the tractions over which the fuel map is taken to be a parabola; see
-    /// [`Linearisation::fit_frac`].
-    pub fit_frac: f64,
     /// Intervals held at fuel cut-off (empty: none).
     pub forced_cut: Vec<bool>,
     /// Intervals in which the driveline may be open (empty: in none).
@@ -250,8 +247,8 @@ pub fn iterate(
         let targets: Vec<f64> =
             now.e_j_kg.iter().zip(&problem.e_min).map(|(e, low)| e.max(*low)).collect();
         let driven = drive_profile(truck, course, &targets, &now.gears, &[], 0.0).e_j_kg;
-        let (gears, cut, fit_frac) = (&now.gears, problem.cut, problem.fit_frac);
-        let point = Linearisation { e_j_kg: &driven, gears, beta_g_s: beta, cut, fit_frac };
+        let (gears, cut) = (&now.gears, problem.cut);
+        let point = Linearisation { e_j_kg: &driven, gears, beta_g_s: beta, cut };
         sub.linearise(truck, course, tuning, &point);
         sub.force_cut(&problem.forced_cut);
         bounds(problem, &driven, &now.gears, &mut sub);

@@ -5,12 +5,12 @@
 //! | `planner` | a request checked, sampled and solved |
 //! | `price` | what a second and a joule are worth in fuel |
 //! | `result` | what a trip's plan comes to: totals, rows, savings |
-//! | `torques` | speeds once more, where the fuel map bends |
+//! | `tube` | speeds once more, with the fuel map as it is |
 
 mod planner;
 mod price;
 mod result;
-mod torques;
+mod tube;
 
 pub use planner::{Trip, TripRequest};
 pub use price::{Leg, Price};

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use road::ProfilePoint;
 use tractrix_core::VehicleLimits;
 
-use super::torques::settle_torques;
+use super::tube::settle_in_tubes;
 use crate::pcc::error::{PccError, check};
 use crate::pcc::model::{
     Course, Drive, Driven, MIN_SPEED_M_S, SpeedBand, Truck, Tuning, cruise_energies, cruise_trip,
@@ -146,7 +146,6 @@ impl Trip {
             fence_s: None,
             start_gear: None,
             cut: CutModel::Hull,
-            fit_frac: 1.0,
             forced_cut: Vec::new(),
             may_roll: Vec::new(),
         }
@@ -204,7 +203,7 @@ impl Trip {
         if self.eco_roll {
             self.open_driveline(&mut problem, &mut best, solver);
         }
-        settle_torques(&mut problem, &mut best, solver);
+        settle_in_tubes(&problem, &mut best);
         match best.kept {
             Some(kept) => (self.or_cruise(kept.driven, trip_time_s, end_e), kept.profile),
             None => (self.cruise.clone(), Profile::failed(self.cruising())),
@@ -381,7 +380,7 @@ struct Guess {
 /// A plan with what it costs.
 pub(super) struct Kept {
     cost_g: f64,
-    driven: Driven,
+    pub(super) driven: Driven,
     pub(super) profile: Profile,
 }
 
@@ -393,12 +392,27 @@ pub(super) struct Best<'a> {
 }
 
 impl Best<'_> {
+    /// Duration that counts as in time, s.
+    fn latest_s(&self) -> f64 {
+        self.trip_time_s * (1.0 + 1e-5)
+    }
+
+    /// What the best plan costs, g; infinite without one.
+    pub(super) fn cost_g(&self) -> f64 {
+        self.kept.as_ref().map_or(f64::INFINITY, |kept| kept.cost_g)
+    }
+
+    /// Whether a plan of this duration, s, comes too late.
+    pub(super) fn is_late(&self, time_s: f64) -> bool {
+        time_s > self.latest_s()
+    }
+
     /// Drives a profile and keeps it if it costs less than the best so far: fuel, and the price of
     /// time for what it is late or lies below the minimum speed, tenfold so that such a plan wins
-    /// only where there is no other. Whether it is kept.
-    pub(super) fn offer(&mut self, problem: &Problem<'_>, profile: Profile) -> bool {
+    /// only where there is no other.
+    pub(super) fn offer(&mut self, problem: &Problem<'_>, profile: Profile) {
         if !matches!(profile.status, SolveStatus::Solved | SolveStatus::AlmostSolved) {
-            return false;
+            return;
         }
         let driven = drive_profile(
             problem.truck,
@@ -409,7 +423,7 @@ impl Best<'_> {
             problem.tuning.shift_fuel_g,
         );
         let price = profile.beta_g_s.max(self.trip.beta_guess());
-        let late = (driven.trip_time_s() - self.trip_time_s * (1.0 + 1e-5)).max(0.0);
+        let late = (driven.trip_time_s() - self.latest_s()).max(0.0);
         let h_m = problem.course.h_m;
         let slow: f64 = driven
             .e_j_kg
@@ -419,11 +433,9 @@ impl Best<'_> {
             .map(|(e, low)| h_m / libm::sqrt(2.0 * e) * (1.0 - libm::sqrt(e / low)))
             .sum();
         let cost_g = driven.total_fuel_g() + 10.0 * price * (late + slow);
-        let better = self.kept.as_ref().is_none_or(|kept| cost_g < kept.cost_g);
-        if better {
+        if cost_g < self.cost_g() {
             self.kept = Some(Kept { cost_g, driven, profile });
         }
-        better
     }
 
     /// Energies and gears from a search in a tube around the best, if its gears are other ones.

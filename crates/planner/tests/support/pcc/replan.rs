@@ -72,7 +72,6 @@ impl Window {
             fence_s: None,
             start_gear: None,
             cut: CutModel::Hull,
-            fit_frac: 1.0,
             forced_cut: Vec::new(),
             may_roll: Vec::new(),
         };

@@ -1,0 +1,253 @@
+//! Speeds once more, with the engine as it is: dynamic programming in a narrow tube around the plan.
+//!
+//! A subproblem takes an interval's fuel for one parabola over all tractions. A measured map bends at
+//! the torques of its test bench, and once more where the engine begins to pull; a plan that costs
+//! least sits on these bends for long. Here each node of the best plan gets a few energies around its
+//! own, each interval is driven from each to each with the map as it is, and the cheapest way through
+//! is kept if it is cheaper when it is driven; closer and closer tubes follow. Gears stay.
+//!
+//! Two things are not sought. Fuel cut-off where the plan injects: with a map that jumps there, full
+//! power and cut-off by turns would pay on a flat road. And a torque that goes up and down between two
+//! ends of a dent in the map, from which the price of a changed acceleration keeps, as far as the
+//! cheapest way to a node tells how it came there.
+
+use alloc::vec::Vec;
+
+use super::planner::Best;
+use crate::pcc::model::{CUT_ROUNDING, Drive, coast_energy, demand_m_s2, duration_s};
+use crate::pcc::solve::{Problem, Profile};
+
+/// Distance of neighbouring energies, one after the other, J/kg: 0.12 to 0.005 m/s at 20 m/s. Far
+/// ones come first: where fuel is dear at low load, close ones alone find many short bursts in place
+/// of few long ones.
+const STEPS_J_KG: [f64; 4] = [2.4, 0.8, 0.3, 0.1];
+/// Most tubes of one step.
+const ROUNDS: usize = 4;
+/// Gain of a tube, relative, below which no other of its step follows.
+const LEAST_GAIN: f64 = 2e-5;
+/// Most prices of time that are tried in a tube.
+const PRICES: usize = 8;
+/// Factor from one price to the next until they enclose the trip time.
+const PRICE_STEP: f64 = 1.1;
+/// Energies on either side of the plan.
+const HALF: usize = 6;
+/// Energies of a node.
+const LEVELS: usize = 2 * HALF + 1;
+/// Part of the tuning's price of a changed acceleration that is paid here. All of it leaves 0.5 % of
+/// the fuel on a map with dents to a reference that pays nothing for it; with none the force changes
+/// half as much again as that reference's, with this a third as much (docs/results/pcc.md).
+const RESTLESS_SHARE: f64 = 0.4;
+
+/// A figure per energy of a node.
+type Levels = [f64; LEVELS];
+
+/// Improves the best plan in its gears.
+pub(super) fn settle_in_tubes(problem: &Problem<'_>, best: &mut Best<'_>) {
+    for step_j_kg in STEPS_J_KG {
+        for _ in 0..ROUNDS {
+            let before_g = best.cost_g();
+            improve(problem, best, step_j_kg);
+            if best.cost_g() > before_g * (1.0 - LEAST_GAIN) {
+                break;
+            }
+        }
+    }
+}
+
+/// Offers the cheapest ways through one tube that come in time.
+fn improve(problem: &Problem<'_>, best: &mut Best<'_>, step_j_kg: f64) {
+    let Some(kept) = &best.kept else { return };
+    let from = kept.profile.clone();
+    let tube = Tube::around(problem, &kept.driven.e_j_kg, &from.gears, step_j_kg);
+    let (mut low, mut high) = (None, None);
+    let mut beta_g_s = from.beta_g_s.max(f64::MIN_POSITIVE);
+    for _ in 0..PRICES {
+        let Some(e_j_kg) = tube.cheapest(beta_g_s) else { break };
+        if best.is_late(tube.time_s(&e_j_kg)) {
+            low = Some(beta_g_s);
+        } else {
+            high = Some(beta_g_s);
+            let cut = (0..from.gears.len())
+                .map(|k| demand(problem, &from.gears, &e_j_kg, k) < CUT_ROUNDING)
+                .collect();
+            best.offer(problem, Profile { e_j_kg, beta_g_s, cut, ..from.clone() });
+        }
+        beta_g_s = match (low, high) {
+            (Some(low), Some(high)) => 0.5 * (low + high),
+            (Some(low), None) => low * PRICE_STEP,
+            (None, Some(high)) => high / PRICE_STEP,
+            (None, None) => beta_g_s,
+        };
+    }
+}
+
+/// What interval `k` of a profile asks for, m/s².
+fn demand(problem: &Problem<'_>, gears: &[Drive], e_j_kg: &[f64], k: usize) -> f64 {
+    demand_m_s2(problem.truck, problem.course, k, gears[k], e_j_kg[k], e_j_kg[k + 1])
+}
+
+/// Energies per node, and what each interval costs between them.
+struct Tube {
+    h_m: f64,
+    /// Price of a changed acceleration, g s⁴/m².
+    restless_g_s4_m2: f64,
+    /// Energies per node, J/kg; infinite where the truck must not be.
+    e_j_kg: Vec<Levels>,
+    /// Their speeds, m/s.
+    v_m_s: Vec<Levels>,
+    /// Per interval `[from][to]`: fuel and the price of acceleration, g; infinite where it cannot be
+    /// driven.
+    cost_g: Vec<[[f32; LEVELS]; LEVELS]>,
+}
+
+impl Tube {
+    fn around(problem: &Problem<'_>, plan_j_kg: &[f64], gears: &[Drive], step_j_kg: f64) -> Self {
+        let (truck, course, n) = (problem.truck, problem.course, gears.len());
+        let allowed = |k: usize, at: f64| {
+            let plan = plan_j_kg[k];
+            let inside = at >= problem.e_min[k].min(plan) && at <= problem.e_max[k].max(plan);
+            if inside { at } else { f64::INFINITY }
+        };
+        let asked: Vec<f64> = (0..n).map(|k| demand(problem, gears, plan_j_kg, k)).collect();
+        // Where nothing drives or brakes each energy leads to one.
+        let coasts = |k: usize| gears[k] == Drive::Neutral || asked[k].abs() < CUT_ROUNDING;
+        let mut e_j_kg: Vec<Levels> = Vec::with_capacity(n + 1);
+        for (k, &plan) in plan_j_kg.iter().enumerate() {
+            e_j_kg.push(core::array::from_fn(|j| {
+                if k > 0 && coasts(k - 1) {
+                    let before = e_j_kg[k - 1][j];
+                    let coasted = || coast_energy(truck, course, k - 1, gears[k - 1], before);
+                    if before.is_finite() { allowed(k, coasted()) } else { before }
+                } else if j == HALF {
+                    plan
+                } else if k == 0 || k == n {
+                    f64::INFINITY
+                } else {
+                    allowed(k, plan + (j as f64 - HALF as f64) * step_j_kg)
+                }
+            }));
+        }
+        let v_m_s: Vec<Levels> = e_j_kg.iter().map(|e| e.map(|e| libm::sqrt(2.0 * e))).collect();
+        let tuning = problem.tuning;
+        let mut tube = Self {
+            h_m: course.h_m,
+            restless_g_s4_m2: RESTLESS_SHARE * tuning.accel_change_penalty_g_s4_m2,
+            e_j_kg,
+            v_m_s,
+            cost_g: Vec::with_capacity(n),
+        };
+        for (k, &drive) in gears.iter().enumerate() {
+            tube.cost_g.push(tube.costs(problem, k, drive, asked[k] < CUT_ROUNDING));
+        }
+        tube
+    }
+
+    /// Costs of interval `k`, in which the plan's fuel is cut off or not.
+    fn costs(
+        &self,
+        problem: &Problem<'_>,
+        k: usize,
+        drive: Drive,
+        is_cut: bool,
+    ) -> [[f32; LEVELS]; LEVELS] {
+        let (truck, course) = (problem.truck, problem.course);
+        let mut cost_g = [[f32::INFINITY; LEVELS]; LEVELS];
+        let priced = |from: usize, to: usize, rate_g_s: f64| {
+            let a = self.accel_m_s2(k, from, to);
+            let rate_g_s = rate_g_s + problem.tuning.accel_penalty_g_s3_m2 * a * a;
+            (rate_g_s * self.duration_s(k, from, to)) as f32
+        };
+        let Drive::Gear(gear) = drive else {
+            for (j, row) in cost_g.iter_mut().enumerate() {
+                if self.e_j_kg[k + 1][j].is_finite() {
+                    row[j] = priced(j, j, truck.idle_fuel_g_s());
+                }
+            }
+            return cost_g;
+        };
+        let inertia = truck.inertia(drive);
+        // The energies of a node lie at equal distances, so that pairs of one sum share their mean.
+        for sum in 0..2 * LEVELS - 1 {
+            let pairs = sum.saturating_sub(LEVELS - 1)..=sum.min(LEVELS - 1);
+            let drivable = |from: &usize| {
+                self.e_j_kg[k][*from].is_finite() && self.e_j_kg[k + 1][sum - from].is_finite()
+            };
+            let Some(one) = pairs.clone().find(drivable) else { continue };
+            let mean = 0.5 * (self.e_j_kg[k][one] + self.e_j_kg[k + 1][sum - one]);
+            let at = truck.at(gear as usize, libm::sqrt(2.0 * mean));
+            let held = at.overrun_m_s2() + truck.resistance_m_s2(mean, &course.road[k]);
+            let full = at.traction_m_s2();
+            for from in pairs.filter(drivable) {
+                let to = sum - from;
+                let p = inertia * self.accel_m_s2(k, from, to) + held;
+                if p > full || p < -course.brake_m_s2 {
+                    continue;
+                }
+                let p = if p < CUT_ROUNDING { 0.0 } else { p };
+                let rate_g_s = if is_cut { at.fuel_g_s(p) } else { at.fuel_charged_g_s(p) };
+                cost_g[from][to] = priced(from, to, rate_g_s);
+            }
+        }
+        cost_g
+    }
+
+    fn accel_m_s2(&self, k: usize, from: usize, to: usize) -> f64 {
+        (self.e_j_kg[k + 1][to] - self.e_j_kg[k][from]) / self.h_m
+    }
+
+    fn duration_s(&self, k: usize, from: usize, to: usize) -> f64 {
+        2.0 * self.h_m / (self.v_m_s[k][from] + self.v_m_s[k + 1][to])
+    }
+
+    fn time_s(&self, e_j_kg: &[f64]) -> f64 {
+        e_j_kg.windows(2).map(|w| duration_s(self.h_m, w[0], w[1])).sum()
+    }
+
+    /// Energies of the cheapest way at a price of time; `None` where there is none.
+    fn cheapest(&self, beta_g_s: f64) -> Option<Vec<f64>> {
+        let mut ways = [Way::NONE; LEVELS];
+        ways[HALF].cost_g = 0.0;
+        let mut came_from = Vec::with_capacity(self.cost_g.len());
+        for (k, costs) in self.cost_g.iter().enumerate() {
+            let mut next = [Way::NONE; LEVELS];
+            let mut before = [0_u8; LEVELS];
+            for (from, way) in ways.iter().enumerate().filter(|(_, way)| way.cost_g.is_finite()) {
+                for (to, cost) in costs[from].iter().enumerate().filter(|(_, c)| c.is_finite()) {
+                    let accel = self.accel_m_s2(k, from, to);
+                    let change = if k == 0 { 0.0 } else { accel - way.accel_m_s2 };
+                    let cost_g = way.cost_g
+                        + f64::from(*cost)
+                        + beta_g_s * self.duration_s(k, from, to)
+                        + self.restless_g_s4_m2 * change * change;
+                    if cost_g < next[to].cost_g {
+                        next[to] = Way { cost_g, accel_m_s2: accel };
+                        before[to] = from as u8;
+                    }
+                }
+            }
+            ways = next;
+            came_from.push(before);
+        }
+        let mut at = HALF;
+        if ways[at].cost_g.is_infinite() {
+            return None;
+        }
+        let mut e_j_kg: Vec<f64> = self.e_j_kg.iter().map(|e| e[HALF]).collect();
+        for (k, before) in came_from.iter().enumerate().rev() {
+            at = usize::from(before[at]);
+            e_j_kg[k] = self.e_j_kg[k][at];
+        }
+        Some(e_j_kg)
+    }
+}
+
+/// The cheapest way to an energy of a node, and the acceleration that it comes with.
+#[derive(Debug, Clone, Copy)]
+struct Way {
+    cost_g: f64,
+    accel_m_s2: f64,
+}
+
+impl Way {
+    const NONE: Self = Self { cost_g: f64::INFINITY, accel_m_s2: 0.0 };
+}
