@@ -8,8 +8,9 @@ use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S};
 
 use crate::Drive;
 use crate::course::Course;
+use crate::free::{directions, prior};
 use crate::problem::Problem;
-use crate::refit::{Fit, directions, prior};
+use crate::refit::Fit;
 use crate::replay::{Module, Prepared};
 use crate::stats::evidence;
 

@@ -20,10 +20,11 @@ use dynamics::catalogue::Law;
 use nalgebra::{DMatrix, DVector};
 
 use crate::decisions::{RHO, RHO_SHAPE, TAU, WEATHER};
+use crate::free::directions;
 use crate::hypothesis::{Along, CATALOGUE, Hypothesis};
 use crate::param::{P, Theta};
 use crate::problem::{Direction, Gram, Hat};
-use crate::refit::{Fit, directions};
+use crate::refit::Fit;
 use crate::signal::signal;
 
 /// Hat functions along one signal.

@@ -47,6 +47,9 @@ pub(crate) const FREE_FORM_TIMES: f64 = 3.0;
 pub(crate) const MIN_FIRST: f64 = 6.0;
 /// Least evidence for another cause, and for a first one that has a rival, nats: clean.
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
+/// Evidence that another cause, or fewer causes, in the place of one must add, nats: less is a tie, and
+/// what was found first stays.
+pub(crate) const SWAP_NATS: f64 = 1.0;
 /// Evidence that tells two explanations apart, nats: odds of twenty, where "strong" begins (Kass and
 /// Raftery, J. Am. Stat. Assoc. 90, 1995). For rivals, unseen halves and drives held out.
 pub(crate) const STRONG_NATS: f64 = 3.0;

@@ -8,9 +8,10 @@ use crate::decisions::{
     STRONG_NATS, WORTH,
 };
 use crate::evidence::Evidence;
+use crate::free::prior;
 use crate::hypothesis::CATALOGUE;
 use crate::problem::Direction;
-use crate::refit::{Fit, prior};
+use crate::refit::Fit;
 use crate::stats::evidence;
 use crate::weights::log_odds;
 

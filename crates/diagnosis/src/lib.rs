@@ -24,7 +24,7 @@
 //! | causes | `hypothesis`, `param`, `sentence`; physics and words stand in `dynamics::catalogue` |
 //! | replay | `plant`, `replay`, `signal`, `parts` |
 //! | problem | `problem`, `course`, `baseline`, `stats` |
-//! | search | `decisions`, `evidence`, `screen`, `fit`, `refit`, `search`, `gate`, `held_out`, `worth`, `weights` |
+//! | search | `decisions`, `evidence`, `screen`, `fit`, `free`, `refit`, `search`, `gate`, `held_out`, `worth`, `weights` |
 //! | outside the catalogue | `unknown`, `catch_all`, `sure` |
 //! | answer | `diagnosis`, `causes`, `wrong`, `observable`, `detectable`, `gain`, `verdict`, `overlay` |
 //! | run | `outcome`, `report`, `drive_use`, `table_trial`, `executor` |
@@ -49,6 +49,7 @@ pub mod experiment;
 pub mod fidelity;
 mod finding;
 pub mod fit;
+mod free;
 pub mod from_log;
 mod gain;
 mod gate;

@@ -5,10 +5,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::course::Course;
 use crate::evidence::Evidence;
+use crate::free::{directions, prior};
 use crate::hypothesis::{CATALOGUE, Start};
 use crate::param::{P, Theta};
 use crate::problem::{Direction, Gram};
-use crate::refit::{Fit, directions, prior};
+use crate::refit::Fit;
 use crate::stats::evidence;
 
 /// Steps by which a size is moved whose effect is not linear: what a strong wind does is no multiple of

@@ -6,7 +6,7 @@
 //! cause, ten for a further one. What a helper would patch of the form of a large cause is in the
 //! score already ([`crate::course`]).
 
-use crate::decisions::{AHEAD, MIN_EVIDENCE, MIN_FIRST, RANKED};
+use crate::decisions::{AHEAD, MIN_EVIDENCE, MIN_FIRST, RANKED, SWAP_NATS};
 use crate::evidence::Evidence;
 use crate::hypothesis::{CATALOGUE, Hypothesis};
 use crate::param::{PARAMS, Spec, Theta};
@@ -111,7 +111,7 @@ impl dyn Evidence + '_ {
             let Some(one) = self.with_added(&there, &pair[0], zero_norm, f64::NEG_INFINITY) else {
                 continue;
             };
-            let needed = if one.set.len() >= best.set.len() { MIN_EVIDENCE } else { 1.0 };
+            let needed = if one.set.len() >= best.set.len() { MIN_EVIDENCE } else { SWAP_NATS };
             let least = winner.as_ref().map_or(best.log_z + needed, |w| w.log_z);
             winner = self.with_added(&one, &pair[1], zero_norm, least).or(winner);
         }
@@ -219,7 +219,7 @@ impl dyn Evidence + '_ {
                         if f.log_z + c.gain < best.log_z - 20.0 - 0.1 * (best.log_z - f.log_z) {
                             continue;
                         }
-                        let least = best.log_z + 1.0;
+                        let least = best.log_z + SWAP_NATS;
                         if let Some(s) = self.with_added(&f, c, zero_norm, least) {
                             (best, screen) = (s, None);
                             changed = true;

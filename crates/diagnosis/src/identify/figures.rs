@@ -7,10 +7,10 @@ use dynamics::{Overlay, TruckParameters};
 
 use super::LOAD_SHEET_FRAC;
 use crate::Channel as C;
+use crate::free::Prior;
 use crate::hypothesis::CATALOGUE;
 use crate::overlay;
 use crate::param::P;
-use crate::refit::Prior;
 use crate::replay::Prepared;
 
 /// Spread of a reference torque and of a full load that a sheet says, relative.

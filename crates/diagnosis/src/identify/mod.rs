@@ -27,9 +27,10 @@ use std::borrow::Cow;
 use dynamics::TruckParameters;
 use serde::Serialize;
 
+use crate::free::Prior;
 use crate::param::P;
 use crate::problem::Problem;
-use crate::refit::{Fit, Prior};
+use crate::refit::Fit;
 use crate::replay::Prepared;
 use crate::{DiagnosisError, Drive, DriveSet, Executor, Finding, Plant, sentence};
 use figures::{FIGURES, Figure, Standing};

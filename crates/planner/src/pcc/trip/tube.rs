@@ -6,8 +6,8 @@
 //! own, each interval is driven from each to each with the map as it is, and the cheapest way through
 //! is kept if it is cheaper when it is driven; closer and closer tubes follow. Gears stay.
 //!
-//! Two things are not sought. Fuel cut-off where the plan injects: with a map that jumps there, full
-//! power and cut-off by turns would pay on a flat road. And a torque that goes up and down between two
+//! Two things are not sought. Fuel cut-off where the plan injects, and injection amid a cut-off: with a
+//! map that jumps there, full power and cut-off by turns would pay on a flat road. And a torque that goes up and down between two
 //! ends of a dent in the map, from which the price of a changed acceleration keeps, as far as the
 //! cheapest way to a node tells how it came there.
 
@@ -86,6 +86,15 @@ fn demand(problem: &Problem<'_>, gears: &[Drive], e_j_kg: &[f64], k: usize) -> f
     demand_m_s2(problem.truck, problem.course, k, gears[k], e_j_kg[k], e_j_kg[k + 1])
 }
 
+/// What an interval of the plan does.
+#[derive(Debug, Clone, Copy)]
+struct Planned {
+    /// Whether its fuel is cut off.
+    is_cut: bool,
+    /// Whether that of its neighbours is as well.
+    is_amid_cut: bool,
+}
+
 /// Energies per node, and what each interval costs between them.
 struct Tube {
     h_m: f64,
@@ -137,18 +146,23 @@ impl Tube {
             cost_g: Vec::with_capacity(n),
         };
         for (k, &drive) in gears.iter().enumerate() {
-            tube.cost_g.push(tube.costs(problem, k, drive, asked[k] < CUT_ROUNDING));
+            let around = &asked[k.saturating_sub(1)..(k + 2).min(n)];
+            let plan = Planned {
+                is_cut: asked[k] < CUT_ROUNDING,
+                is_amid_cut: around.iter().all(|p| *p < CUT_ROUNDING),
+            };
+            tube.cost_g.push(tube.costs(problem, k, drive, plan));
         }
         tube
     }
 
-    /// Costs of interval `k`, in which the plan's fuel is cut off or not.
+    /// Costs of interval `k`.
     fn costs(
         &self,
         problem: &Problem<'_>,
         k: usize,
         drive: Drive,
-        is_cut: bool,
+        plan: Planned,
     ) -> [[f32; LEVELS]; LEVELS] {
         let (truck, course) = (problem.truck, problem.course);
         let mut cost_g = [[f32::INFINITY; LEVELS]; LEVELS];
@@ -184,7 +198,10 @@ impl Tube {
                     continue;
                 }
                 let p = if p < CUT_ROUNDING { 0.0 } else { p };
-                let rate_g_s = if is_cut { at.fuel_g_s(p) } else { at.fuel_charged_g_s(p) };
+                if plan.is_amid_cut && p > 0.0 {
+                    continue;
+                }
+                let rate_g_s = if plan.is_cut { at.fuel_g_s(p) } else { at.fuel_charged_g_s(p) };
                 cost_g[from][to] = priced(from, to, rate_g_s);
             }
         }
