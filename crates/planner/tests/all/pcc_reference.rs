@@ -71,7 +71,7 @@ fn plans_are_as_good_as_dynamic_programming_on_a_few_short_roads() {
         let start = profile[0].s_m;
         let profile: Vec<ProfilePoint> =
             profile.into_iter().take_while(|p| p.s_m <= start + length_m).collect();
-        for engine in [Engine::Continuous, Engine::BenchMap, Engine::Measured] {
+        for engine in [Engine::Continuous, Engine::BenchMap] {
             let limits = truck(mass, engine);
             let (band_km_h, eco_roll) = (BANDS_KM_H[1], false);
             let case = Case { name, profile: &profile, limits: &limits, band_km_h, eco_roll };
@@ -83,6 +83,20 @@ fn plans_are_as_good_as_dynamic_programming_on_a_few_short_roads() {
             assert!(r.ratio > 0.98, "{name} {mass}: {:.5} of the reference", r.ratio);
         }
     }
+}
+
+/// The story: an interval's fuel was one parabola over all tractions, and on a map that bends at the
+/// torques of its test bench a plan took 0.9 % more than the reference; with a kink at each plan's own
+/// traction it was 0.31 % on this road.
+#[test]
+fn a_plan_on_a_measured_map_sits_on_its_bends_as_the_reference_does() {
+    let (name, profile) = corpus::unseen().swap_remove(3);
+    let limits = truck(19_000.0, Engine::Measured);
+    let (band_km_h, eco_roll) = (BANDS_KM_H[1], false);
+    let case = Case { name: &name, profile: &profile, limits: &limits, band_km_h, eco_roll };
+    let ratio = case.row(dp::QUICK).ratio;
+    assert!(ratio < 1.0025, "{ratio:.5} of the reference");
+    assert!(ratio > 0.997, "{ratio:.5}: a weak reference");
 }
 
 const HEAD: &str = "| road | mass, t | band, km/h | plan, g | time, s | shifts | rolled, % | reference, g | its shifts | plan / reference |\n|---|---|---|---|---|---|---|---|---|---|";
