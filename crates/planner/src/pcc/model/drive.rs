@@ -95,11 +95,11 @@ pub(crate) fn demand_m_s2(
 }
 
 /// What an interval needs, and what the engine has at its mean energy.
-struct Demand<'a> {
+pub(crate) struct Demand<'a> {
     /// As [`demand_m_s2`].
-    needed_m_s2: f64,
+    pub(crate) needed_m_s2: f64,
     /// Full load's traction, m/s²; zero with the driveline open.
-    limit_m_s2: f64,
+    pub(crate) limit_m_s2: f64,
     /// The engine; `None` with the driveline open.
     at: Option<Operating<'a>>,
 }
@@ -111,9 +111,21 @@ impl<'a> Demand<'a> {
             Drive::Gear(g) => Some(truck.at(g as usize, libm::sqrt(2.0 * mean))),
             Drive::Neutral => None,
         };
+        Self::with(truck, course, k, drive, at, (e0, e1))
+    }
+
+    /// The same with the engine read already, near the mean energy.
+    pub(crate) fn with(
+        truck: &Truck,
+        course: &Course,
+        k: usize,
+        drive: Drive,
+        at: Option<Operating<'a>>,
+        (e0, e1): (f64, f64),
+    ) -> Self {
         let needed_m_s2 = truck.inertia(drive) * (e1 - e0) / course.h_m
             + at.map_or(0.0, |at| at.overrun_m_s2())
-            + truck.resistance_m_s2(mean, &course.road[k]);
+            + truck.resistance_m_s2(0.5 * (e0 + e1), &course.road[k]);
         Self { needed_m_s2, limit_m_s2: at.map_or(0.0, |at| at.traction_m_s2()), at }
     }
 

@@ -18,7 +18,7 @@ pub(crate) use course::MIN_SPEED_M_S;
 pub use course::{Course, SpeedBand, Tuning, profile_of};
 pub(crate) use cruise::{cruise_energies, cruise_trip};
 pub(crate) use drive::{
-    CUT_ROUNDING, E_FLOOR, coast_energy, demand_m_s2, drive_leg, duration_s, needed_before,
+    CUT_ROUNDING, Demand, E_FLOOR, coast_energy, demand_m_s2, drive_leg, duration_s, needed_before,
 };
 pub use drive::{Driven, drive_profile};
 pub(crate) use truck::Operating;

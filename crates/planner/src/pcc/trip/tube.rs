@@ -14,7 +14,7 @@
 use alloc::vec::Vec;
 
 use super::planner::Best;
-use crate::pcc::model::{CUT_ROUNDING, Drive, coast_energy, demand_m_s2, duration_s};
+use crate::pcc::model::{CUT_ROUNDING, Demand, Drive, coast_energy, demand_m_s2, duration_s};
 use crate::pcc::solve::{Problem, Profile};
 
 /// Acceleration from an energy to the neighbouring one of the next node, one after the other, m/s²: at
@@ -104,11 +104,8 @@ struct Tube {
     restless_g_s4_m2: f64,
     /// Energies per node, J/kg; infinite where the truck must not be.
     e_j_kg: Vec<Levels>,
-    /// Their speeds, m/s.
-    v_m_s: Vec<Levels>,
-    /// Per interval `[from][to]`: fuel and the price of acceleration, g; infinite where it cannot be
-    /// driven.
-    cost_g: Vec<[[f32; LEVELS]; LEVELS]>,
+    /// Per interval `[from][to]`.
+    edges: Vec<Edges>,
 }
 
 impl Tube {
@@ -138,14 +135,12 @@ impl Tube {
                 }
             }));
         }
-        let v_m_s: Vec<Levels> = e_j_kg.iter().map(|e| e.map(|e| libm::sqrt(2.0 * e))).collect();
         let tuning = problem.tuning;
         let mut tube = Self {
             h_m: course.h_m,
             restless_g_s4_m2: RESTLESS_SHARE * tuning.accel_change_penalty_g_s4_m2,
             e_j_kg,
-            v_m_s,
-            cost_g: Vec::with_capacity(n),
+            edges: Vec::with_capacity(n),
         };
         for (k, &drive) in gears.iter().enumerate() {
             let around = &asked[k.saturating_sub(1)..(k + 2).min(n)];
@@ -153,36 +148,30 @@ impl Tube {
                 is_cut: asked[k] < CUT_ROUNDING,
                 is_amid_cut: around.iter().all(|p| *p < CUT_ROUNDING),
             };
-            tube.cost_g.push(tube.costs(problem, k, drive, plan));
+            tube.edges.push(tube.edges(problem, k, drive, plan));
         }
         tube
     }
 
-    /// Costs of interval `k`.
-    fn costs(
-        &self,
-        problem: &Problem<'_>,
-        k: usize,
-        drive: Drive,
-        plan: Planned,
-    ) -> [[f32; LEVELS]; LEVELS] {
+    /// What interval `k` takes between its energies.
+    fn edges(&self, problem: &Problem<'_>, k: usize, drive: Drive, plan: Planned) -> Edges {
         let (truck, course) = (problem.truck, problem.course);
-        let mut cost_g = [[f32::INFINITY; LEVELS]; LEVELS];
-        let priced = |from: usize, to: usize, rate_g_s: f64| {
+        let mut edges = [[Edge::NONE; LEVELS]; LEVELS];
+        let edge = |from: usize, to: usize, rate_g_s: f64| {
             let a = self.accel_m_s2(k, from, to);
             let rate_g_s = rate_g_s + problem.tuning.accel_penalty_g_s3_m2 * a * a;
-            (rate_g_s * self.duration_s(k, from, to)) as f32
+            let time_s = duration_s(self.h_m, self.e_j_kg[k][from], self.e_j_kg[k + 1][to]);
+            Edge { cost_g: (rate_g_s * time_s) as f32, time_s: time_s as f32 }
         };
         let Drive::Gear(gear) = drive else {
-            for (j, row) in cost_g.iter_mut().enumerate() {
+            for (j, row) in edges.iter_mut().enumerate() {
                 if self.e_j_kg[k + 1][j].is_finite() {
-                    row[j] = priced(j, j, truck.idle_fuel_g_s());
+                    row[j] = edge(j, j, truck.idle_fuel_g_s());
                 }
             }
-            return cost_g;
+            return edges;
         };
-        let inertia = truck.inertia(drive);
-        // The energies of a node lie at equal distances, so that pairs of one sum share their mean.
+        // The energies of a node lie at equal distances, or nearly: pairs of one sum share their mean.
         for sum in 0..2 * LEVELS - 1 {
             let pairs = sum.saturating_sub(LEVELS - 1)..=sum.min(LEVELS - 1);
             let drivable = |from: &usize| {
@@ -191,31 +180,26 @@ impl Tube {
             let Some(one) = pairs.clone().find(drivable) else { continue };
             let mean = 0.5 * (self.e_j_kg[k][one] + self.e_j_kg[k + 1][sum - one]);
             let at = truck.at(gear as usize, libm::sqrt(2.0 * mean));
-            let held = at.overrun_m_s2() + truck.resistance_m_s2(mean, &course.road[k]);
-            let full = at.traction_m_s2();
             for from in pairs.filter(drivable) {
                 let to = sum - from;
-                let p = inertia * self.accel_m_s2(k, from, to) + held;
-                if p > full || p < -course.brake_m_s2 {
+                let ends_j_kg = (self.e_j_kg[k][from], self.e_j_kg[k + 1][to]);
+                let asked = Demand::with(truck, course, k, drive, Some(at), ends_j_kg);
+                let p = asked.needed_m_s2;
+                let pulls = p >= CUT_ROUNDING;
+                let is_out_of_reach = p > asked.limit_m_s2 || p < -course.brake_m_s2;
+                if is_out_of_reach || pulls && plan.is_amid_cut {
                     continue;
                 }
-                let p = if p < CUT_ROUNDING { 0.0 } else { p };
-                if plan.is_amid_cut && p > 0.0 {
-                    continue;
-                }
+                let p = if pulls { p } else { 0.0 };
                 let rate_g_s = if plan.is_cut { at.fuel_g_s(p) } else { at.fuel_charged_g_s(p) };
-                cost_g[from][to] = priced(from, to, rate_g_s);
+                edges[from][to] = edge(from, to, rate_g_s);
             }
         }
-        cost_g
+        edges
     }
 
     fn accel_m_s2(&self, k: usize, from: usize, to: usize) -> f64 {
         (self.e_j_kg[k + 1][to] - self.e_j_kg[k][from]) / self.h_m
-    }
-
-    fn duration_s(&self, k: usize, from: usize, to: usize) -> f64 {
-        2.0 * self.h_m / (self.v_m_s[k][from] + self.v_m_s[k + 1][to])
     }
 
     fn time_s(&self, e_j_kg: &[f64]) -> f64 {
@@ -226,17 +210,19 @@ impl Tube {
     fn cheapest(&self, beta_g_s: f64) -> Option<Vec<f64>> {
         let mut ways = [Way::NONE; LEVELS];
         ways[HALF].cost_g = 0.0;
-        let mut came_from = Vec::with_capacity(self.cost_g.len());
-        for (k, costs) in self.cost_g.iter().enumerate() {
+        let mut came_from = Vec::with_capacity(self.edges.len());
+        for (k, edges) in self.edges.iter().enumerate() {
             let mut next = [Way::NONE; LEVELS];
             let mut before = [0_u8; LEVELS];
             for (from, way) in ways.iter().enumerate().filter(|(_, way)| way.cost_g.is_finite()) {
-                for (to, cost) in costs[from].iter().enumerate().filter(|(_, c)| c.is_finite()) {
+                for (to, edge) in
+                    edges[from].iter().enumerate().filter(|(_, e)| e.cost_g.is_finite())
+                {
                     let accel = self.accel_m_s2(k, from, to);
                     let change = if k == 0 { 0.0 } else { accel - way.accel_m_s2 };
                     let cost_g = way.cost_g
-                        + f64::from(*cost)
-                        + beta_g_s * self.duration_s(k, from, to)
+                        + f64::from(edge.cost_g)
+                        + beta_g_s * f64::from(edge.time_s)
                         + self.restless_g_s4_m2 * change * change;
                     if cost_g < next[to].cost_g {
                         next[to] = Way { cost_g, accel_m_s2: accel };
@@ -259,6 +245,21 @@ impl Tube {
         Some(e_j_kg)
     }
 }
+
+/// What an interval takes from an energy to one of the next node.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    /// Fuel and the price of acceleration, g; infinite where it cannot be driven.
+    cost_g: f32,
+    time_s: f32,
+}
+
+impl Edge {
+    const NONE: Self = Self { cost_g: f32::INFINITY, time_s: 0.0 };
+}
+
+/// `[from][to]`.
+type Edges = [[Edge; LEVELS]; LEVELS];
 
 /// The cheapest way to an energy of a node, and the acceleration that it comes with.
 #[derive(Debug, Clone, Copy)]
