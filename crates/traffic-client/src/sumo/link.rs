@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::error::SumoError;
 use super::process::{Process, Programs};
 use super::session::{Answer, Session};
-use super::tcp::{Connection, LinkError, free_port};
+use super::tcp::{Connection, LinkError, PortClaim};
 
 /// TraCI versions that this client was checked with.
 const VERSIONS: std::ops::RangeInclusive<i32> = 20..=22;
@@ -74,7 +74,9 @@ impl Link {
         options: &[String],
         timeouts: Timeouts,
     ) -> Result<Self, SumoError> {
-        let port = free_port()?;
+        // Kept until SUMO has answered: from then on its own connection holds the port.
+        let claim = PortClaim::new()?;
+        let port = claim.port;
         let mut process = Process::start(programs, &with_port(options, port))?;
         let wait = Duration::from_secs_f64(timeouts.startup_s);
         let opened = Connection::open(port, wait, || process.is_alive());

@@ -4,6 +4,8 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
+use socket2::{Domain, Socket, Type};
+
 use super::codec::Frames;
 use super::error::SumoError;
 
@@ -115,15 +117,35 @@ fn link(e: &std::io::Error) -> LinkError {
     }
 }
 
-/// A port that is free now.
+/// A local port that the system gives to nobody else while this lives.
 ///
-/// # Errors
-/// [`SumoError::File`] if the system gives none.
-#[expect(clippy::disallowed_methods, reason = "asks the system for a free port for SUMO")]
-pub fn free_port() -> Result<u16, SumoError> {
-    let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
-    std::net::TcpListener::bind(any)
-        .and_then(|listener| listener.local_addr())
-        .map(|address| address.port())
-        .map_err(|e| SumoError::File { path: "127.0.0.1:0".to_owned(), why: e.to_string() })
+/// It is bound and does not listen, so that SUMO, which allows addresses to be used again, can
+/// listen there. A port that was only looked up and let go was given to two that started at the
+/// same time: each talked to the other's SUMO.
+#[derive(Debug)]
+pub struct PortClaim {
+    _socket: Socket,
+    /// The port.
+    pub port: u16,
+}
+
+impl PortClaim {
+    /// A port that is free now.
+    ///
+    /// # Errors
+    /// [`SumoError::File`] if the system gives none.
+    pub fn new() -> Result<Self, SumoError> {
+        let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let claim = || {
+            let socket = Socket::new(Domain::IPV4, Type::STREAM, None)?;
+            socket.set_reuse_address(true)?;
+            socket.bind(&any.into())?;
+            let address = socket.local_addr()?.as_socket().ok_or(ErrorKind::AddrNotAvailable)?;
+            Ok(Self { _socket: socket, port: address.port() })
+        };
+        claim().map_err(|e: std::io::Error| SumoError::File {
+            path: "127.0.0.1:0".to_owned(),
+            why: e.to_string(),
+        })
+    }
 }

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use traffic_client::sumo::codec::{Value, Writer};
 use traffic_client::sumo::session::{Answer, id, var};
+use traffic_client::sumo::tcp::PortClaim;
 use traffic_client::sumo::{Link, Programs, SumoError, Timeouts};
 
 const QUICK: Timeouts = Timeouts { startup_s: 5.0, answer_s: 0.3 };
@@ -230,4 +231,19 @@ fn a_program_that_is_not_sumo_is_named_with_what_it_printed() {
         assert!(e.contains(program) && e.contains(said), "{e}");
     }
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Two worlds that began at the same time were given one port, one after the other, and each drove
+/// in the other's SUMO: the second connected to the SUMO of the first, which then closed the port
+/// for the SUMO of the second. Once in some hundred runs of all tests.
+#[test]
+fn a_port_is_nobody_elses_from_its_choice_until_sumo_listens_there() {
+    let claim = PortClaim::new().unwrap();
+    for _ in 0..100_000 {
+        let other = TcpListener::bind("127.0.0.1:0").unwrap();
+        assert_ne!(other.local_addr().unwrap().port(), claim.port);
+    }
+    let sumo = TcpListener::bind(("127.0.0.1", claim.port)).unwrap();
+    assert!(TcpStream::connect(("127.0.0.1", claim.port)).is_ok());
+    drop(sumo);
 }
