@@ -12,7 +12,7 @@ use crate::screen::outside;
 use crate::sentence;
 use crate::sure::{beyond, shows};
 use crate::unknown::{Acts, Shape};
-use crate::weights::{Weighed, beside, probability, weights};
+use crate::weights::{Weighed, beside, of_functions, probability, weights};
 use crate::{Cause, Confusion, Parameter};
 
 /// A named cause, and whether another one says as much.
@@ -190,10 +190,8 @@ pub(crate) fn causes(
         }
     }
     out.sort_by(|a, b| b.cause.evidence.total_cmp(&a.cause.evidence));
-    let mut instead: Vec<(Shape, f64)> = Vec::new();
-    for (n, shape) in functions.into_iter().enumerate().skip(firm.len()) {
-        instead.push((shape, probability(&models, &weights, |m| m.function == Some(n))));
-    }
+    let of = of_functions(&models, &weights, functions.len());
+    let mut instead: Vec<(Shape, f64)> = functions.into_iter().zip(of).skip(firm.len()).collect();
     instead.sort_by(|a, b| b.1.total_cmp(&a.1));
     Answer { causes: out, instead }
 }

@@ -11,7 +11,7 @@ use crate::problem::{Direction, Hat, Problem, Rest};
 use crate::replay::Module;
 use crate::signal::SIGNALS;
 use crate::stats::evidence;
-use crate::unknown::{Acts, Shape, dispersion};
+use crate::unknown::{Acts, Shape, dispersion, explained};
 
 /// Correlation length over the knots' range.
 const LENGTH: f64 = 0.4;
@@ -85,17 +85,18 @@ impl Problem<'_> {
             if !self.drives.iter().any(|d| d.available[part.module as usize]) {
                 continue;
             }
+            let excess = self.excess(part.module, residuals);
             for (place, signal) in SIGNALS.iter().enumerate() {
                 let of = if signal.memory_s > 0.0 { part.remembers } else { part.follows };
                 if of.contains(&signal.name) {
-                    out.extend(self.part(at, part, place, residuals));
+                    out.extend(self.part(at, part, place, excess));
                 }
             }
         }
         out
     }
 
-    fn part(&self, at: &Point, part: &Part, place: usize, residuals: &[Rest]) -> Option<Shape> {
+    fn part(&self, at: &Point, part: &Part, place: usize, excess: f64) -> Option<Shape> {
         let (p, module) = (part.p, part.module);
         let whole = Direction::new(p, Vec::new(), p.spec().step);
         let hat = |knot| Direction {
@@ -139,7 +140,7 @@ impl Problem<'_> {
             log_z,
             firm,
             knots: f.iter().enumerate().map(|(k, y)| (knot(k), *y)).collect(),
-            explained_frac: self.explained(module, residuals, 2.0 * b.dot(&w) - (&a * &w).dot(&w)),
+            explained_frac: explained(excess, 2.0 * b.dot(&w) - (&a * &w).dot(&w)),
         })
     }
 }

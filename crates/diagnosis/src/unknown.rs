@@ -162,6 +162,7 @@ impl Problem<'_> {
             if !self.drives.iter().any(|d| d.available[m]) || rows < LEAST_ROWS {
                 continue;
             }
+            let excess = self.excess(*module, &residuals);
             let weights = SCALED.contains(module).then(|| {
                 self.each(|i| own_size(&self.drives[i], *module, &self.raw(i, *module, &at.theta)))
             });
@@ -172,10 +173,11 @@ impl Problem<'_> {
                 let values = rows_of
                     .entry((module.row_step(), place))
                     .or_insert_with(|| self.each(|i| means(&self.drives[i], signal, *module)));
-                out.extend(self.shape(at, (*module, signal, None), *size, values, &residuals));
+                let form = (*module, signal, None);
+                out.extend(self.shape(at, form, (*size, excess), values, &residuals));
                 if let (Some(weights), true) = (&weights, SLOW.contains(&signal.name)) {
                     let form = (*module, signal, Some(weights.as_slice()));
-                    out.extend(self.shape(at, form, FACTOR, values, &residuals));
+                    out.extend(self.shape(at, form, (FACTOR, excess), values, &residuals));
                 }
             }
         }
@@ -183,13 +185,13 @@ impl Problem<'_> {
         out
     }
 
-    /// A free function of `size` of a signal with these `values` in a module, times the weights of
-    /// the rows if there are any.
+    /// A free function of `size` of a signal with these `values` in a module that has this excess over
+    /// its noise, times the weights of the rows if there are any.
     fn shape(
         &self,
         at: &Point,
         (module, signal, weights): (Module, &Signal, Option<&[Vec<f64>]>),
-        size: f64,
+        (size, excess): (f64, f64),
         values: &[Vec<f64>],
         residuals: &[Rest],
     ) -> Option<Shape> {
@@ -249,17 +251,21 @@ impl Problem<'_> {
             log_z,
             firm,
             knots: (0..KNOTS).map(|k| (lo + k as f64 * width, f[k])).collect(),
-            explained_frac: self.explained(module, residuals, taken),
+            explained_frac: explained(excess, taken),
         })
     }
 
-    /// Part of a module's excess over its noise that a function takes, which is the whole of it at
-    /// the most.
-    pub(crate) fn explained(&self, module: Module, residuals: &[Rest], taken: f64) -> f64 {
+    /// A module's excess over its noise.
+    pub(crate) fn excess(&self, module: Module, residuals: &[Rest]) -> f64 {
         let m = module as usize;
         let rows: f64 =
             self.drives.iter().map(|d| d.valid[m].iter().filter(|x| **x).count() as f64).sum();
         let chi: f64 = residuals.iter().flat_map(|r| &r.whitened[m]).map(|x| x * x).sum();
-        (taken / (chi - rows).max(taken).max(1.0)).clamp(0.0, 1.0)
+        chi - rows
     }
+}
+
+/// Part of a module's excess that a function takes, which is the whole of it at the most.
+pub(crate) fn explained(excess: f64, taken: f64) -> f64 {
+    (taken / excess.max(taken).max(1.0)).clamp(0.0, 1.0)
 }

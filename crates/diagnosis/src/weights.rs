@@ -11,6 +11,8 @@
 //! cause's part of the balance and follow a signal. One beside the causes is judged before
 //! ([`crate::sure`]).
 
+use std::collections::BTreeMap;
+
 use crate::decisions::{PRIOR_CAUSE, PRIOR_FUNCTION};
 
 /// Log odds of a prior probability.
@@ -53,23 +55,20 @@ pub(crate) fn weights(models: &[Weighed]) -> Vec<f64> {
         m.log_z + m.causes.len() as f64 * log_odds(PRIOR_CAUSE) + function
     };
     let scores: Vec<f64> = models.iter().map(score).collect();
-    let same = |a: &Weighed, b: &Weighed| {
-        a.function == b.function
-            && a.causes.len() == b.causes.len()
-            && a.causes.iter().all(|c| b.causes.contains(c))
-    };
-    let best = |i: usize| {
-        models
-            .iter()
-            .enumerate()
-            .all(|(j, m)| j == i || !same(m, &models[i]) || (scores[j], i) < (scores[i], j))
-    };
+    let mut best: BTreeMap<(Option<usize>, Vec<&str>), usize> = BTreeMap::new();
+    for (i, m) in models.iter().enumerate() {
+        let mut causes = m.causes.clone();
+        causes.sort_unstable();
+        let before = best.entry((m.function, causes)).or_insert(i);
+        if scores[i] > scores[*before] {
+            *before = i;
+        }
+    }
     let top = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let raw: Vec<f64> = scores
-        .iter()
-        .enumerate()
-        .map(|(i, s)| if best(i) { (s - top).exp() } else { 0.0 })
-        .collect();
+    let mut raw = vec![0.0; models.len()];
+    for i in best.into_values() {
+        raw[i] = (scores[i] - top).exp();
+    }
     let sum: f64 = raw.iter().sum();
     raw.iter().map(|w| w / sum).collect()
 }
@@ -82,6 +81,17 @@ pub(crate) fn probability(
 ) -> f64 {
     let chosen = models.iter().zip(weights).filter(|(m, _)| pick(m));
     chosen.map(|(_, w)| w).sum::<f64>().clamp(0.0, 1.0)
+}
+
+/// Weight of the models with each of the first `functions` functions, by their numbers.
+pub(crate) fn of_functions(models: &[Weighed], weights: &[f64], functions: usize) -> Vec<f64> {
+    let mut sums = vec![0.0; functions];
+    for (model, weight) in models.iter().zip(weights) {
+        if let Some(sum) = model.function.and_then(|n| sums.get_mut(n)) {
+            *sum += weight;
+        }
+    }
+    sums.into_iter().map(|sum: f64| sum.clamp(0.0, 1.0)).collect()
 }
 
 #[cfg(test)]

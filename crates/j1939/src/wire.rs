@@ -32,51 +32,97 @@ const CRC_GENERATOR: u16 = 0x4599;
 /// After so many equal bits the sender puts in one of the other kind.
 const EQUAL_BITS: u32 = 5;
 
+/// What a byte at the top of the check sequence makes of it.
+const CRC_OF_BYTE: [u16; 256] = {
+    let mut table = [0; 256];
+    let mut byte = 0;
+    while byte < 256 {
+        let (mut crc, mut bit) = ((byte as u16) << 7, 0);
+        while bit < 8 {
+            let feedback = crc >> 14 & 1 == 1;
+            crc = crc << 1 & 0x7FFF;
+            if feedback {
+                crc ^= CRC_GENERATOR;
+            }
+            bit += 1;
+        }
+        table[byte] = crc;
+        byte += 1;
+    }
+    table
+};
+
+/// What a byte does after one to four zeros that went over the wire before it.
+#[derive(Clone, Copy)]
+struct Stuffing {
+    /// Stuff bits that it needs.
+    count: u8,
+    /// Equal bits at its end, less one.
+    equal: u8,
+    /// These bits: all zeros or all ones.
+    last: u8,
+}
+
+/// By the zeros before, less one, and the byte.
+const STUFFING: [[Stuffing; 256]; 4] = {
+    let mut table = [[Stuffing { count: 0, equal: 0, last: 0 }; 256]; 4];
+    let mut at = 0;
+    while at < 4 * 256 {
+        let (before, byte) = (at / 256, at % 256);
+        let (mut run, mut last, mut count, mut bit) = (before as u32 + 1, 0, 0, 8);
+        while bit > 0 {
+            bit -= 1;
+            let next = byte >> bit & 1;
+            run = if next == last { run + 1 } else { 1 };
+            last = next;
+            if run == EQUAL_BITS {
+                (last, run, count) = (1 - last, 1, count + 1);
+            }
+        }
+        let (equal, last) = (run as u8 - 1, if last == 1 { 0xFF } else { 0 });
+        table[before][byte] = Stuffing { count, equal, last };
+        at += 1;
+    }
+    table
+};
+
 /// Bits from the start of a frame to the end of the space behind it, with the stuff bits that its
 /// content needs.
 #[must_use]
 pub fn frame_bits(frame: &Frame) -> u32 {
-    let raw = frame.id().raw();
-    let mut bits = Stuffed { crc: 0, last: true, run: 0, count: 0 };
-    bits.push(0, 1); // start of frame
-    bits.push(raw >> 18, 11);
-    bits.push(0b11, 2); // substitute remote request, identifier extension
-    bits.push(raw & 0x3_FFFF, 18);
-    bits.push(0, 3); // no remote request, two reserved bits
-    bits.push(frame.bytes().len() as u32, 4);
-    for byte in frame.bytes() {
-        bits.push(u32::from(*byte), 8);
-    }
-    let crc = u32::from(bits.crc);
-    bits.push(crc, 15);
-    bits.count + BITS_AFTER_CRC
+    let raw = u128::from(frame.id().raw());
+    // start of frame: zero; identifier; substitute remote request, identifier extension: ones;
+    // identifier; no remote request, two reserved bits: zeros; length
+    let head = raw >> 18 << 27 | 0b11 << 25 | (raw & 0x3_FFFF) << 7 | frame.bytes().len() as u128;
+    let with = |bits: u128, byte: &u8| bits << 8 | u128::from(*byte);
+    let bits = frame.bytes().iter().fold(head, with);
+    let bytes = frame.bytes().len() as u32;
+    let checked = bits << 15 | u128::from(crc(bits, 5 + bytes));
+    // Two bits fill the first byte. The second one ends what was before the frame.
+    let width = 54 + 8 * bytes;
+    width + stuffed(checked | 0b01 << width, 7 + bytes) + BITS_AFTER_CRC
 }
 
-/// Counts bits as they go over the wire.
-struct Stuffed {
-    crc: u16,
-    last: bool,
-    run: u32,
-    count: u32,
+/// Check sequence of so many bytes. Zeros before them change nothing.
+fn crc(bits: u128, bytes: u32) -> u16 {
+    let add = |crc: u16, byte: u32| {
+        let top = crc >> 7 ^ (bits >> (8 * byte)) as u16 & 0xFF;
+        crc << 8 & 0x7FFF ^ CRC_OF_BYTE.get(usize::from(top)).copied().unwrap_or(0)
+    };
+    (0..bytes).rev().fold(0, add)
 }
 
-impl Stuffed {
-    /// The low `width` bits of a value, highest first.
-    fn push(&mut self, value: u32, width: u32) {
-        for at in (0..width).rev() {
-            let bit = value >> at & 1 == 1;
-            let feedback = bit != (self.crc >> 14 & 1 == 1);
-            self.crc = self.crc << 1 & 0x7FFF;
-            if feedback {
-                self.crc ^= CRC_GENERATOR;
-            }
-            self.run = if bit == self.last { self.run + 1 } else { 1 };
-            (self.last, self.count) = (bit, self.count + 1);
-            if self.run == EQUAL_BITS {
-                (self.last, self.run, self.count) = (!bit, 1, self.count + 1);
-            }
-        }
+/// Stuff bits of so many bytes, of which the first bit is a zero.
+fn stuffed(bits: u128, bytes: u32) -> u32 {
+    let (mut state, mut count) = (Stuffing { count: 0, equal: 0, last: 0xFF }, 0);
+    for at in (0..bytes).rev() {
+        let (of, last) = (&STUFFING[usize::from(state.equal & 3)], state.last);
+        // A byte after ones is the opposite of one after zeros.
+        state = of[usize::from((bits >> (8 * at)) as u8 ^ last)];
+        state.last ^= last;
+        count += u32::from(state.count);
     }
+    count
 }
 
 /// Slices of the window in which the load is counted.
@@ -144,24 +190,51 @@ mod tests {
 
     #[test]
     fn the_check_sequence_is_crc_15_can() {
-        let mut bits = Stuffed { crc: 0, last: true, run: 0, count: 0 };
-        for byte in b"123456789" {
-            bits.push(u32::from(*byte), 8);
-        }
-        assert_eq!(bits.crc, 0x059E, "check value of CRC-15/CAN");
+        let bits = b"123456789".iter().fold(0, |bits, byte| bits << 8 | u128::from(*byte));
+        assert_eq!(crc(bits, 9), 0x059E, "check value of CRC-15/CAN");
     }
 
     #[test]
     fn long_runs_are_stuffed() {
-        let mut bits = Stuffed { crc: 0, last: true, run: 0, count: 0 };
-        bits.push(0, 5);
-        assert_eq!(bits.count, 6);
+        assert_eq!(stuffed(0b0101_1111, 1), 1);
         // the stuff bit is the first of the next run
-        bits.push(0b1111, 4);
-        assert_eq!(bits.count, 6 + 4 + 1);
+        assert_eq!(stuffed(0b0001_0000_0111_1010, 2), 2);
+        assert_eq!(stuffed(0b0001_0000_0011_1101, 2), 1);
+        assert_eq!((stuffed(0, 3), stuffed(0x55, 1)), (4, 0));
+    }
+
+    /// Bit by bit, as they go over the wire.
+    fn one_by_one(bits: u128, width: u32) -> (u16, u32) {
+        let (mut crc, mut last, mut run, mut stuffed) = (0_u16, true, 0, 0);
+        for at in (0..width).rev() {
+            let bit = bits >> at & 1 == 1;
+            let feedback = bit != (crc >> 14 & 1 == 1);
+            crc = crc << 1 & 0x7FFF;
+            if feedback {
+                crc ^= CRC_GENERATOR;
+            }
+            run = if bit == last { run + 1 } else { 1 };
+            last = bit;
+            if run == EQUAL_BITS {
+                (last, run, stuffed) = (!bit, 1, stuffed + 1);
+            }
+        }
+        (crc, stuffed)
     }
 
     proptest! {
+        #[test]
+        fn bytes_are_checked_and_stuffed_as_their_bits(
+            bits in any::<u128>(), sparse in any::<u128>(), bytes in 1_u32..=15
+        ) {
+            // Random bits have few long runs.
+            for bits in [bits, bits & sparse & sparse.rotate_left(7), bits | sparse | !(bits >> 3)] {
+                let bits = bits & ((1 << (8 * bytes - 1)) - 1);
+                let all = (crc(bits, bytes), stuffed(bits, bytes));
+                prop_assert_eq!(all, one_by_one(bits, 8 * bytes));
+            }
+        }
+
         #[test]
         fn a_frame_is_never_shorter_than_its_fields_nor_longer_than_fully_stuffed(
             raw in 0_u32..1 << 29, data in proptest::collection::vec(any::<u8>(), 0..=8)

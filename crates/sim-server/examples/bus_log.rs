@@ -10,6 +10,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::BufWriter;
 use std::path::Path;
 
 use flate2::Compression;
@@ -47,7 +48,9 @@ pub(crate) fn log(scenario: &Scenario, out: &Path, every_s: f64) {
     let wire = Loopback::new(BitRate::Kbit250, 3);
     let mut logger = wire.node(2);
     world.put_on_bus(BitRate::Kbit250, Box::new(wire.node(0)), Box::new(wire.node(1))).unwrap();
-    let mut file = GzEncoder::new(File::create(out).unwrap(), Compression::best());
+    // A line comes in pieces of a byte, each of which would cost the compressor a buffer of 32 kB.
+    let packed = GzEncoder::new(File::create(out).unwrap(), Compression::best());
+    let mut file = BufWriter::new(packed);
     let mut last_s: BTreeMap<u32, f64> = BTreeMap::new();
     loop {
         let status = world.tick(&mut ()).unwrap();
@@ -62,5 +65,5 @@ pub(crate) fn log(scenario: &Scenario, out: &Path, every_s: f64) {
             break;
         }
     }
-    file.finish().unwrap();
+    file.into_inner().unwrap().finish().unwrap();
 }
