@@ -9,6 +9,8 @@ use crate::support::{program, server};
 
 /// Simulated time of a run and of traffic that do not say how long, s.
 const SHORT_S: &str = "15";
+/// Longest simulated time that is driven of a run that says how long, s.
+const LONGEST_S: f64 = 60.0;
 
 fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
@@ -135,6 +137,13 @@ fn shortened(arguments: &[String]) -> Vec<String> {
     }
     if ["run", "traffic"].contains(&arguments[0].as_str()) && lacks("--duration", &arguments) {
         arguments.extend(["--duration", SHORT_S].map(str::to_owned));
+    }
+    let duration = arguments.iter().position(|a| a == "--duration");
+    if let (Some(at), "run") = (duration, arguments[0].as_str()) {
+        let says_s = arguments.get(at + 1).and_then(|s| s.parse::<f64>().ok());
+        if says_s.is_some_and(|s| s > LONGEST_S) {
+            arguments[at + 1] = LONGEST_S.to_string();
+        }
     }
     arguments
 }
