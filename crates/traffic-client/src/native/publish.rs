@@ -30,6 +30,29 @@ pub(crate) fn progress_of(done: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// How far a vehicle's tail may swing out of the lanes that it changes between, m: what a lane of
+/// 3.75 m leaves a truck of 2.55 m on each side.
+const SWING_M: f64 = 0.6;
+
+/// A lane change at an instant.
+struct Shift {
+    /// Share that is done.
+    done: f64,
+    /// From lane to lane, to the left, m.
+    way_m: f64,
+}
+
+impl Shift {
+    /// How far a body of this length may be turned out of the road's direction, rad: its ends stay
+    /// on the way from lane to lane and within [`SWING_M`] of it. Who changes lanes at a crawl is
+    /// faster across the road than along it, and its course is no measure of where its body points:
+    /// a long truck would swing its tail across the lane beside it.
+    fn most_turned_rad(&self, length_m: f64) -> f64 {
+        let room_m = self.done.min(1.0 - self.done) * self.way_m.abs() + SWING_M;
+        libm::asin((room_m / (0.5 * length_m)).min(1.0))
+    }
+}
+
 /// Writes the vehicles within the scene's radius of `ego_s_m` into the scene, `tau_s` after the
 /// tick. Those whose front is within `poses_within_m` of it have poses on the road; NaN without.
 pub(crate) fn publish(
@@ -59,16 +82,19 @@ pub(crate) fn publish(
         let (mut d_m, slope) = lane.center_and_slope(middle_m);
         let mut lateral_speed_m_s = slope * speed_m_s;
         let target = fleet.target[i];
+        let mut shift = None;
         if target != NO_LANE {
             let (done, rate) = quintic((fleet.clock_s[i] + tau_s) / driver.lane_change_s);
             let way_m = map.lanes[target as usize].center_d_m(middle_m) - d_m;
+            shift = Some(Shift { done, way_m });
             d_m += done * way_m;
             lateral_speed_m_s += rate * way_m / driver.lane_change_s;
         }
         let (x_m, y_m, yaw_rad) = if (front_s_m - ego_s_m).abs() <= poses_within_m {
             let at = road.at(middle_m, d_m);
             let turned_rad = libm::atan2(lateral_speed_m_s, speed_m_s.max(1.0));
-            (at.x_m, at.y_m, at.heading_rad + turned_rad)
+            let most_rad = shift.map_or(f64::INFINITY, |s| s.most_turned_rad(driver.length_m));
+            (at.x_m, at.y_m, at.heading_rad + turned_rad.clamp(-most_rad, most_rad))
         } else {
             (f64::NAN, f64::NAN, f64::NAN)
         };
@@ -114,7 +140,25 @@ pub(crate) fn carry_on(n: &Neighbour, tau_s: f64) -> Neighbour {
 
 #[cfg(test)]
 mod tests {
-    use super::{progress_of, quintic};
+    use super::{SWING_M, Shift, progress_of, quintic};
+
+    /// A truck that changed lanes at 1.3 m/s was shown 38 degrees across its lane, and its tail hit
+    /// who stood on its other side.
+    #[test]
+    fn a_long_truck_that_changes_lanes_at_a_crawl_does_not_swing_into_a_third_lane() {
+        for (length_m, p) in
+            [17.2, 12.0, 4.5].into_iter().flat_map(|l| [0.1, 0.5, 0.8].map(|p| (l, p)))
+        {
+            let (shift, rate) = (Shift { done: quintic(p).0, way_m: -3.75 }, quintic(p).1);
+            let most_rad = shift.most_turned_rad(length_m);
+            let end_m = 0.5 * length_m * most_rad.sin();
+            let (first_m, last_m) = (shift.done * 3.75 - end_m, shift.done * 3.75 + end_m);
+            assert!(first_m >= -SWING_M - 1e-9 && last_m <= 3.75 + SWING_M + 1e-9, "{p}");
+            // On the move, a body points where it goes.
+            let course_rad = libm::atan2(rate * 3.75 / 5.0, 8.0);
+            assert!(course_rad < most_rad, "{length_m} m, {p}: {course_rad} {most_rad}");
+        }
+    }
 
     #[test]
     fn the_progress_of_a_share_gives_the_share_again() {
