@@ -30,25 +30,23 @@ pub(crate) fn progress_of(done: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// How far a vehicle's tail may swing out of the lanes that it changes between, m: what a lane of
-/// 3.75 m leaves a truck of 2.55 m on each side.
-const SWING_M: f64 = 0.6;
-
 /// A lane change at an instant.
 struct Shift {
     /// Share that is done.
     done: f64,
     /// From lane to lane, to the left, m.
     way_m: f64,
+    /// What the lane that is left has on each side of the vehicle, m.
+    beside_m: f64,
 }
 
 impl Shift {
     /// How far a body of this length may be turned out of the road's direction, rad: its ends stay
-    /// on the way from lane to lane and within [`SWING_M`] of it. Who changes lanes at a crawl is
-    /// faster across the road than along it, and its course is no measure of where its body points:
-    /// a long truck would swing its tail across the lane beside it.
+    /// on the way from lane to lane, and beside it no further out than in their lane. Who changes
+    /// lanes at a crawl is faster across the road than along it, and its course is no measure of
+    /// where its body points: a long truck would swing its tail across the lane beside it.
     fn most_turned_rad(&self, length_m: f64) -> f64 {
-        let room_m = self.done.min(1.0 - self.done) * self.way_m.abs() + SWING_M;
+        let room_m = self.done.min(1.0 - self.done) * self.way_m.abs() + self.beside_m;
         libm::asin((room_m / (0.5 * length_m)).min(1.0))
     }
 }
@@ -86,7 +84,9 @@ pub(crate) fn publish(
         if target != NO_LANE {
             let (done, rate) = quintic((fleet.clock_s[i] + tau_s) / driver.lane_change_s);
             let way_m = map.lanes[target as usize].center_d_m(middle_m) - d_m;
-            shift = Some(Shift { done, way_m });
+            let width_m = lane.center_and_width_m(middle_m).1;
+            let beside_m = (0.5 * (width_m - engine.config.class(driver.class).width_m)).max(0.0);
+            shift = Some(Shift { done, way_m, beside_m });
             d_m += done * way_m;
             lateral_speed_m_s += rate * way_m / driver.lane_change_s;
         }
@@ -140,7 +140,7 @@ pub(crate) fn carry_on(n: &Neighbour, tau_s: f64) -> Neighbour {
 
 #[cfg(test)]
 mod tests {
-    use super::{SWING_M, Shift, progress_of, quintic};
+    use super::{Shift, progress_of, quintic};
 
     /// A truck that changed lanes at 1.3 m/s was shown 38 degrees across its lane, and its tail hit
     /// who stood on its other side.
@@ -149,11 +149,13 @@ mod tests {
         for (length_m, p) in
             [17.2, 12.0, 4.5].into_iter().flat_map(|l| [0.1, 0.5, 0.8].map(|p| (l, p)))
         {
-            let (shift, rate) = (Shift { done: quintic(p).0, way_m: -3.75 }, quintic(p).1);
+            let beside_m = 0.6;
+            let (done, rate) = quintic(p);
+            let shift = Shift { done, way_m: -3.75, beside_m };
             let most_rad = shift.most_turned_rad(length_m);
             let end_m = 0.5 * length_m * most_rad.sin();
             let (first_m, last_m) = (shift.done * 3.75 - end_m, shift.done * 3.75 + end_m);
-            assert!(first_m >= -SWING_M - 1e-9 && last_m <= 3.75 + SWING_M + 1e-9, "{p}");
+            assert!(first_m >= -beside_m - 1e-9 && last_m <= 3.75 + beside_m + 1e-9, "{p}");
             // On the move, a body points where it goes.
             let course_rad = libm::atan2(rate * 3.75 / 5.0, 8.0);
             assert!(course_rad < most_rad, "{length_m} m, {p}: {course_rad} {most_rad}");
