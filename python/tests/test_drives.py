@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import gzip
 import importlib.util
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,14 @@ def lines() -> Iterator[str]:
         yield from log
 
 
-def written(to: Path) -> Path:
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """The example log in a container, which takes ten seconds to be written as MF4."""
+    folder = tmp_path_factory.mktemp("written")
+    return functools.cache(lambda container: write(folder / f"friday{container}"))
+
+
+def write(to: Path) -> Path:
     """The example log by python-can, in the container that the name says."""
     import can
 
@@ -73,12 +81,14 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
 @needs_can
 @pytest.mark.parametrize("container", [".asc", ".blf", ".mf4", ".trc"])
 def test_every_container_gives_the_same_drives(
-    container: str, tmp_path: Path, expected: dict[str, list[str]]
+    container: str,
+    tmp_path: Path,
+    expected: dict[str, list[str]],
+    written: Callable[[str], Path],
 ) -> None:
     if container == ".mf4" and not have("asammdf"):
         pytest.skip("asammdf is not installed")
-    log = written(tmp_path / f"friday{container}")
-    tractrix.drives.from_log(log, out=tmp_path / "drives", **HOW)
+    tractrix.drives.from_log(written(container), out=tmp_path / "drives", **HOW)
     made = tables(tmp_path / "drives")
     assert made.keys() == expected.keys()
     for name, rows in expected.items():
@@ -93,11 +103,11 @@ def test_every_container_gives_the_same_drives(
 @needs_can
 @pytest.mark.parametrize("container", [".asc", ".blf", ".mf4", ".trc"])
 def test_a_container_that_is_empty_torn_or_something_else_gets_one_line(
-    container: str, tmp_path: Path
+    container: str, tmp_path: Path, written: Callable[[str], Path]
 ) -> None:
     if container == ".mf4" and not have("asammdf"):
         pytest.skip("asammdf is not installed")
-    whole = written(tmp_path / f"whole{container}").read_bytes()
+    whole = written(container).read_bytes()
     cases = {
         "empty": b"",
         "noise": bytes(range(256)) * 40,

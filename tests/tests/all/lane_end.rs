@@ -4,12 +4,14 @@
 //! overtaken into the climbing lane, stood at its end, and at standstill no gap was long enough.
 
 use planner::{DeciderKind, SpeedPlannerKind};
-use sim::{Drivability, Family, Scenario, World};
+use sim::{Drivability, Family, Scenario, Status, World};
 use tractrix_core::{Recorder, Tick, Vehicle};
 use traffic_client::native::Density;
 
 /// Where the climbing lane of the built-in highway ends, m.
 const END_M: f64 = 8_500.0;
+/// So far beyond it nobody brakes any more for how the truck got in, m.
+const PAST_IT_M: f64 = 400.0;
 
 /// How the truck got out of its lane.
 #[derive(Default)]
@@ -48,9 +50,12 @@ fn drive(density: Density, max_speed_m_s: f64, s_m: f64, speed_m_s: f64, seed: u
     s.stack.speed_planner = SpeedPlannerKind::Cruise;
     s.run.duration_s = 150.0;
     let mut world = World::new(&s, seed).unwrap();
-    let mut way = Way::default();
+    let mut way = Way { passed_m: s_m - END_M, ..Way::default() };
     let mut watch = Drivability::new(world.truck().limits(), &s.stack.rss);
-    let summary = world.run(&mut (&mut way, &mut watch)).unwrap();
+    while way.passed_m < PAST_IT_M
+        && world.tick(&mut (&mut way, &mut watch)).unwrap() == Status::Running
+    {}
+    let summary = world.summary();
     let caused = watch.figures().hard_braking_caused;
     let case = format!("{density:?} from {s_m} m with {speed_m_s} m/s, seed {seed}");
     let bars = [

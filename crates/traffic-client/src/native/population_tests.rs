@@ -151,17 +151,24 @@ fn lane_drop(limit: f64) -> LaneMap {
     LaneMap::new(lanes, 0.0, 5000.0, &|_| 0.0)
 }
 
-/// Drives for `seconds`; every tick is shown to the observers and no two vehicles may touch.
-fn drive(config: TrafficConfig, map: LaneMap, seconds: f64, detector_m: f64) -> (Detector, Undone) {
+/// Drives for `seconds`; every tick is shown to the observer and no two vehicles may touch.
+fn drive(config: TrafficConfig, map: LaneMap, seconds: f64, mut look: impl FnMut(&Engine)) {
     let mut e = engine(config, map);
-    let (mut detector, mut undone) = (Detector::at(detector_m), Undone::default());
     while (e.state.tick as f64) * TICK_S < seconds {
         e.decide();
         assert!(e.min_gap_m() > 0.0, "collision at {} s", e.state.tick as f64 * TICK_S);
         e.commit();
-        detector.look(&e);
-        undone.look(&e);
+        look(&e);
     }
+}
+
+/// Traffic on the flat road at its detector, and which of its lane changes are undone.
+fn watched(config: TrafficConfig, seconds: f64) -> (Detector, Undone) {
+    let (mut detector, mut undone) = (Detector::at(3500.0), Undone::default());
+    drive(config, flat(), seconds, |e| {
+        detector.look(e);
+        undone.look(e);
+    });
     (detector, undone)
 }
 
@@ -199,14 +206,16 @@ fn mean_of_1_h(seeds: u64, config: &TrafficConfig, map: &LaneMap, detector_m: f6
 
 /// Vehicles per hour and lane that pass a station between 600 s and the end.
 fn served_1_h(config: TrafficConfig, map: LaneMap, seconds: f64, detector_m: f64) -> f64 {
-    drive(config, map, seconds, detector_m).0.per_hour(600.0, seconds) / 2.0
+    let mut detector = Detector::at(detector_m);
+    drive(config, map, seconds, |e| detector.look(e));
+    detector.per_hour(600.0, seconds) / 2.0
 }
 
 #[test]
 fn headways_scatter_as_on_roads_and_lane_changes_are_not_undone() {
     // The story: every driver kept nearly the same distance (coefficient of variation 0.23 among
     // those closer than 4 s, nobody below 1 s), and one change in six was undone within 15 s.
-    let (detector, undone) = drive(demand(0.2, 1200.0), flat(), 1000.0, 3500.0);
+    let (detector, undone) = watched(demand(0.2, 1200.0), 1000.0);
     let all = detector.headways_s(200.0);
     let close: Vec<f64> = all.iter().copied().filter(|&h| h < 4.0).collect();
     let below = all.iter().filter(|&&h| h < 1.0).count() as f64 / all.len() as f64;
@@ -359,7 +368,7 @@ fn a_follower_who_misjudges_keeps_his_gap_on_average() {
 #[ignore = "figures for docs/results/traffic.md"]
 fn figures() {
     for (trucks, per_hour) in [(0.0, 720.0), (0.2, 720.0), (0.2, 1200.0), (0.0, 1500.0)] {
-        let (detector, undone) = drive(demand(trucks, per_hour), flat(), 2000.0, 3500.0);
+        let (detector, undone) = watched(demand(trucks, per_hour), 2000.0);
         let all = detector.headways_s(200.0);
         let close: Vec<f64> = all.iter().copied().filter(|&h| h < 4.0).collect();
         let below = all.iter().filter(|&&h| h < 1.0).count() as f64 / all.len() as f64;
