@@ -21,6 +21,7 @@ mod cli;
 mod clock;
 mod control;
 mod failure;
+mod first_wish;
 mod health;
 mod live;
 mod log;

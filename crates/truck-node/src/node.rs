@@ -19,6 +19,7 @@ use crate::cli::{Args, Pose, bus_name};
 use crate::clock::Clock;
 use crate::control::{Asked, Control};
 use crate::failure::Failure;
+use crate::first_wish::FirstWish;
 use crate::health::Health;
 use crate::live::Live;
 use crate::log::{self, Log};
@@ -133,6 +134,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         asked_to_end,
         phase: Phase::Checking,
         wish: DriverWish::None,
+        first_wish: FirstWish::default(),
         ego: None,
         figures: Figures::default(),
         told: (String::new(), Time::ZERO),
@@ -161,6 +163,8 @@ struct Node<'a> {
     phase: Phase,
     /// What is wished of the truck's driver at the beginning of the next tick.
     wish: DriverWish,
+    /// What `--engage-after-checks` still has to bring about.
+    first_wish: FirstWish,
     ego: Option<Stamped<EgoState>>,
     figures: Figures,
     /// What was said last about what is missing, and when.
@@ -260,6 +264,7 @@ impl Node<'_> {
                     if self.args.engage_after_checks {
                         self.wish = DriverWish::Engage;
                     }
+                    self.first_wish = FirstWish::begins(self.args.engage_after_checks);
                 } else if passed.as_secs_f64() >= self.args.ready_within {
                     output::report(&format!(
                         "{:.2} s  not ready\n{}",
@@ -272,7 +277,13 @@ impl Node<'_> {
                     self.tell_missing(now, report.missing());
                 }
             }
-            Phase::Running => self.notice_lost_bus(now)?,
+            Phase::Running => {
+                let is_open = self.first_wish.is_open(self.truck.engagement());
+                if is_open && self.look(now)?.is_ready() {
+                    self.wish = DriverWish::Engage;
+                }
+                self.notice_lost_bus(now)?;
+            }
             Phase::Stopping(since) => {
                 let speed_m_s = self.ego.map_or(0.0, |ego| ego.value.speed_m_s);
                 if !self.truck.engagement().actuates() {
@@ -357,7 +368,10 @@ impl Node<'_> {
             control.answer(name_of(self.truck.engagement()));
         } else if let Some(asked) = control.asked(self.clock.elapsed()) {
             match self.consider(now, asked) {
-                Ok(wish) => self.wish = wish,
+                Ok(wish) => {
+                    self.first_wish.is_over();
+                    self.wish = wish;
+                }
                 Err(why) => control.answer(&format!("refused: {why}")),
             }
         }
