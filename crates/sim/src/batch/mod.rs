@@ -3,6 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | `mod` | the batch: shapes, threads, episodes that begin again |
+//! | `shared` | what the environments of a spec have in common; where an episode begins |
 //! | `env` | one environment: decision, observation, mask |
 //! | `kinematic` | the ego as a point on its path ([`Fidelity::Kinematic`]) |
 //! | `contacts` | whom the truck touches, and who is the cause |
@@ -20,6 +21,7 @@ mod contacts;
 mod env;
 mod kinematic;
 mod reward;
+mod shared;
 mod stats;
 
 use std::sync::Arc;
@@ -30,9 +32,10 @@ use tractrix_core::{LaneChangeRefusal, Maneuver};
 use traffic_client::native::WindowConfig;
 
 pub use advantages::{BasePolicy, Drivers, RolloutSpec};
+use env::Env;
 pub use env::EnvSnapshot;
-use env::{Env, Shared};
 pub use reward::RewardConfig;
+use shared::Shared;
 pub use stats::EpisodeStats;
 
 use crate::{Scenario, SimError, World};
