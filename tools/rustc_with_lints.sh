@@ -2,8 +2,7 @@
 # In place of rustc for the crates of the workspace (RUSTC_WORKSPACE_WRAPPER): compiles one, and runs
 # clippy's lints and rustdoc over it, strictly. `cargo clippy` and `cargo doc` would check 400
 # dependencies anew, only to know of them what the build knows already. What is optimised are the
-# libraries: most tests' own words, and those of the server around them, are not what takes time. A
-# bench is checked and not compiled.
+# libraries: most tests' own words are not what takes time. A bench is checked and not compiled.
 set -euo pipefail
 rustc=$1
 shift
@@ -18,7 +17,6 @@ case $all in
   */diagnosis/src/lib.rs*" --test "* | */traffic-client/src/lib.rs*" --test "* | */bus_loop.rs\ * | */can_soak.rs\ *) optimised=1 ;;
 *" --test "* | */examples/*.rs\ *) optimised=0 ;;
 *" --crate-name build_script_"*) ;;
-*" --crate-name sim_server "*) optimised=0 documented=yes ;;
 *) documented=yes ;;
 esac
 # Clippy is a compiler that leaves out some optimisation: what is delivered needs it, and of the tests
