@@ -19,8 +19,8 @@ impl FirstWish {
         self.stands = false;
     }
 
-    /// Whether it is to be said once more, for it was lost: by who drives after a tick. A signal may
-    /// come late in the very tick that the wish is looked at in.
+    /// Whether it is to be said now, by who drives after a tick. It may have to be said again: a signal
+    /// may come late in the very tick that it is looked at in.
     pub(crate) fn is_open(&mut self, drives: Engagement) -> bool {
         self.stands &= !drives.actuates() && drives != Engagement::Override;
         self.stands && drives == Engagement::Ready

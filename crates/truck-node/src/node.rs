@@ -261,9 +261,6 @@ impl Node<'_> {
                 if report.is_ready() {
                     output::report(&format!("{:.2} s  ready\n{}", now.seconds(), report.text()));
                     self.phase = Phase::Running;
-                    if self.args.engage_after_checks {
-                        self.wish = DriverWish::Engage;
-                    }
                     self.first_wish = FirstWish::begins(self.args.engage_after_checks);
                 } else if passed.as_secs_f64() >= self.args.ready_within {
                     output::report(&format!(

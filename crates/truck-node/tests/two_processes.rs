@@ -50,10 +50,11 @@ fn drives_and_stops(bus: &str, drive_s: f64) {
     assert!(gap_m > 5.0 && gap_m < 80.0, "{state}");
     node.terminate();
     node.until("asked to end: stops");
-    node.until("minimal risk");
+    // A signal that was late just before may have begun the manoeuvre already
     node.until("stands");
     let summary = node.until("let go at");
     println!("{summary}");
+    assert!(number_after(&summary, "guarded,") > 0.0, "no minimal risk: {summary}");
     let (status, said) = node.end();
     assert_eq!(status.code(), Some(0), "{said}");
     assert!(number_after(&summary, "let go at") < 0.1, "{summary}");

@@ -10,7 +10,7 @@ use traffic_client::native::Density;
 
 /// Where the climbing lane of the built-in highway ends, m.
 const END_M: f64 = 8_500.0;
-/// So far beyond it nobody brakes any more for how the truck got in, m.
+/// So far beyond it the truck is watched, m: 18 s or more.
 const PAST_IT_M: f64 = 400.0;
 
 /// How the truck got out of its lane.
