@@ -71,6 +71,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("tyre_warmup", "cold_extra_frac") => Plus("resistance.cold_tyre_extra_frac", 1.0),
         ("tyre_warmup", "ln_time_constant") => Exp("resistance.tyre_warmup_s"),
         ("driveline_loss", "extra_loss_frac") => Carry::Loss,
+        ("driveline_loss", "mesh_loss_frac") => Plus("driveline.mesh_loss_frac", 1.0),
         ("fan_load", "fan_power_kw") => Plus("engine.fan_power_w", 1e3),
         ("fan_load", "coolant_start_offset_k") => Plus("engine.fan_on_k", 1.0),
         ("fan_load", "hysteresis_k") => Plus("engine.fan_hysteresis_k", 1.0),
@@ -88,6 +89,8 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("turbo_lag", "lag_s") => Plus("engine.slow_lag_s", 1.0),
         ("turbo_lag", "threshold_offset_frac") => Plus("engine.lag_threshold_frac", 1.0),
         ("pedal_delay", "delay_s") => Plus("engine.pedal_delay_s", 1.0),
+        // The truck file's delay carries the sum of dead time and lag.
+        ("pedal_delay", "lag_frac") => Carry::Implied,
         ("shift_duration", "extra_time_s") => Carry::Shift,
         ("fuel_map_low_load", "extra_frac") => Plus("engine.fuel.low_load_extra_frac", 1.0),
         ("fuel_map_low_load", "ln_load") => Carry::LowLoad,
@@ -169,7 +172,7 @@ impl Carry {
                     let path = "driveline.axle_efficiency_frac";
                     return one(path, now(path) * (1.0 - value), now(path) * sigma);
                 }
-                let per_loss = d.efficiency_frac() / nominal;
+                let per_loss = d.direct_efficiency_frac() / nominal;
                 let path = "driveline.loss_scale_coeff";
                 one(path, now(path) + per_loss * value, per_loss * sigma)
             }
@@ -393,8 +396,8 @@ mod tests {
         let with = truck
             .with_parameter("driveline.loss_scale_coeff", set["driveline.loss_scale_coeff"].value)
             .unwrap();
-        let expected = truck.driveline.efficiency_frac() * 0.97;
-        assert!((with.driveline.efficiency_frac() - expected).abs() < 1e-12);
+        let expected = truck.driveline.direct_efficiency_frac() * 0.97;
+        assert!((with.driveline.direct_efficiency_frac() - expected).abs() < 1e-12);
         let set = one(cause("shift_duration", &[("extra_time_s", 0.4, 0.02)]));
         assert!((set["shift.duration_scale_coeff"].value - 1.4).abs() < 1e-12);
     }

@@ -92,10 +92,12 @@ pub(crate) enum P {
     CrosswindBehind,
     SideShare,
     SideBehind,
+    MeshLoss,
+    PedalLag,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 83;
+pub(crate) const PARAMS: usize = 85;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -236,6 +238,10 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     // The same of the truck in order, whose baseline shows it by the winds of its days.
     s(P::SideShare, "tractor_share_offset_frac", "1", (0.12, -0.25, 0.5, 0.05), 0.0, 0.0),
     s(P::SideBehind, "trailer_behind_cg_m", "m", (1.0, -4.0, 4.0, 0.2), 0.0, 0.0),
+    // Two pairs of teeth carry the power in all gears but the direct one; a pair loses about 1 %.
+    s(P::MeshLoss, "mesh_loss_frac", "1", (0.015, -0.05, 0.2, 0.005), 0.0, 0.0),
+    // The engine's control unit smooths the pedal, or it only comes late.
+    s(P::PedalLag, "lag_frac", "1", (0.5, 0.0, 1.0, 0.1), 0.0, 0.0),
 ];
 
 impl Spec {
@@ -271,6 +277,8 @@ impl Spec {
                 | P::StiffnessFollowsMass
                 | P::TurboStart
                 | P::SteerDelay
+                | P::MeshLoss
+                | P::PedalLag
                 | P::WindShare
                 | P::CrosswindShare
                 | P::WindBehind

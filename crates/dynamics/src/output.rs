@@ -176,7 +176,7 @@ impl TruckModel {
     /// [`DynamicsError::OutOfBounds`] if a table cannot be built.
     pub fn vehicle_limits_in(&self, patch: &RoadPatch) -> Result<VehicleLimits, DynamicsError> {
         let (p, e, d) = (&self.parameters, &self.parameters.engine, &self.parameters.driveline);
-        let gears = d.gear_ratios.len() as u8;
+        let gears = d.top_gear();
         let speeds: Vec<f64> = (0..=30)
             .map(|i| {
                 (e.idle_speed_rpm + f64::from(i) * (e.max_speed_rpm - e.idle_speed_rpm) / 30.0)
@@ -200,7 +200,7 @@ impl TruckModel {
             geometry: self.geometry(),
             powertrain: PowertrainLimits {
                 gear_ratios: d.gear_ratios.clone(),
-                gear_efficiency_frac: vec![d.efficiency_frac(); d.gear_ratios.len()],
+                gear_efficiency_frac: (1..=gears).map(|g| d.efficiency_frac(g)).collect(),
                 rotating_mass_kg: (1..=gears)
                     .map(|g| d.rotating_mass_kg(e.inertia_kg_m2, g))
                     .collect(),
@@ -262,8 +262,8 @@ impl TruckModel {
         let (e, d) = (&self.parameters.engine, &self.parameters.driveline);
         let level = RoadPiece { cos_grade: 1.0, ..RoadPiece::default() };
         let force_n = self.road_load_in(patch).resistance_n(CRUISE_M_S, &level);
-        let speed_rad_s = d.engine_speed_rad_s(CRUISE_M_S, d.gear_ratios.len() as u8);
-        let indicated_w = force_n * CRUISE_M_S / d.efficiency_frac()
+        let speed_rad_s = d.engine_speed_rad_s(CRUISE_M_S, d.top_gear());
+        let indicated_w = force_n * CRUISE_M_S / d.efficiency_frac(d.top_gear())
             + self.engine.friction_nm(speed_rad_s) * speed_rad_s
             + e.auxiliary_power_w;
         self.mean_fan_w(indicated_w, patch.air_temperature_k)

@@ -29,7 +29,8 @@ impl Interval {
 
 /// Keys with the value that means nothing is wrong, the sign of the hidden size, and the hidden
 /// size itself. One of several keys may be fitted (gates of a retarder, temperatures of a derating). A loss
-/// per 100 K is what is lost 100 K above where fade begins: the generators' laws are curves.
+/// per 100 K is what is lost 100 K above where fade begins: the generators' laws are curves. A driveline's
+/// loss is that of its direct gear.
 fn keys((id, family): (&str, u32), size: f64, shape: &Shape) -> Vec<(&'static str, f64, f64, f64)> {
     let one = |key, neutral, sign| vec![(key, neutral, sign, size)];
     match id {
@@ -45,7 +46,10 @@ fn keys((id, family): (&str, u32), size: f64, shape: &Shape) -> Vec<(&'static st
         "grade_bias" => one("grade_frac", 0.0, -1.0),
         "map_shift" => one("shift_m", 0.0, -1.0),
         "tyre_warmup" => one("cold_extra_frac", 0.0, 1.0),
-        "driveline_loss" => one("extra_loss_frac", 0.0, 1.0),
+        "driveline_loss" => {
+            let direct = if family == 1 { 1.0 } else { 1.0 - shape.at(0, 0.0, 0.2) };
+            vec![("extra_loss_frac", 0.0, 1.0, size * direct)]
+        }
         "fan_load" => one("fan_power_kw", 0.0, 1.0),
         "dragging_brake" => one("force_n", 0.0, 1.0),
         "engine_friction" => one("friction_scale", 1.0, 1.0),

@@ -24,6 +24,8 @@ const ONE: &[Start] = &[[0.0; 2]];
 /// A side force turns the truck one way or the other by where it acts: between the two lies a share
 /// that turns it not at all, which no fit passes.
 const EITHER_SIDE: &[Start] = &[[0.0, 0.0], [0.2, 0.0]];
+/// A delay is a dead time, a lag or both.
+const LATE_OR_SLOW: &[Start] = &[[0.0, 0.0], [0.7, 0.0]];
 /// A meter of a rate may be off by a factor, or more the higher the rate.
 const RATES: &[Start] = &[[0.0, 0.0], [1.0, 0.0]];
 
@@ -82,7 +84,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         1.0,
     )
     .along(&[Open("time_s")]),
-    h("driveline_loss", &[P::DrivelineLoss], &[], ONE, LONG, 0.01, 0.0)
+    h("driveline_loss", &[P::DrivelineLoss], &[P::MeshLoss], ONE, LONG, 0.01, 0.0)
         .along(&[Open("engine_torque_percent")]),
     h(
         "fan_load",
@@ -139,7 +141,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     .along(&[Fitted("coolant_temp_degc"), Open("engine_speed_rpm")]),
     h("turbo_lag", &[P::TurboLag], &[P::TurboStart], ONE, PEDAL, 0.08, 0.0)
         .along(&[Open("engine_speed_rpm")]),
-    h("pedal_delay", &[P::PedalDelay], &[], ONE, PEDAL, 0.03, 0.0)
+    h("pedal_delay", &[P::PedalDelay], &[P::PedalLag], LATE_OR_SLOW, PEDAL, 0.03, 0.0)
         .along(&[Open("engine_speed_rpm")]),
     h("shift_duration", &[P::ShiftTime], &[], ONE, &[C::ShiftInProcess], 0.08, 0.0)
         .along(&[Open("gear"), Open("engine_speed_rpm")]),
@@ -236,16 +238,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         1.0,
     )
     .along(&[Open("speed_m_s")]),
-    h(
-        "steering_lag",
-        &[P::SteerLag],
-        &[P::SteerDelay],
-        &[[0.0, 0.0], [0.7, 0.0]],
-        STEERING,
-        0.03,
-        0.0,
-    )
-    .along(&[Open("speed_m_s")]),
+    h("steering_lag", &[P::SteerLag], &[P::SteerDelay], LATE_OR_SLOW, STEERING, 0.03, 0.0)
+        .along(&[Open("speed_m_s")]),
     h("cornering_stiffness_front", &[P::CFront], &[], ONE, STEERING, 0.05, 0.0)
         .along(&[Open("speed_m_s"), Open("accel_y_m_s2")]),
     h("cornering_stiffness_drive", &[P::CDrive], &[], ONE, STEERING, 0.05, 0.0)

@@ -50,7 +50,7 @@ pub(super) fn completed(truck: &TruckParameters, drive: &Drive) -> (Option<Drive
 fn gears(truck: &TruckParameters, drive: &Drive) -> Option<(Vec<f64>, f64)> {
     let (speed, rpm) = (drive.get(C::SpeedMS)?, drive.get(C::EngineSpeedRpm)?);
     let driveline = &truck.driveline;
-    let count = driveline.gear_ratios.len() as u8;
+    let count = driveline.top_gear();
     let (mut held, mut driven, mut fits) = (1.0, 0_usize, 0_usize);
     let mut out = Vec::with_capacity(drive.len);
     for (v, n) in speed.iter().zip(rpm) {

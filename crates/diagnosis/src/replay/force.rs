@@ -66,7 +66,9 @@ pub(crate) struct Longitudinal<'a> {
     friction: f64,
     engine_brake: f64,
     fan_w: f64,
+    /// In a direct gear, and what gears whose teeth carry the power lose on top.
     efficiency: f64,
+    mesh_loss: f64,
     cd_a_m2: f64,
     drag_yaw_1_rad: f64,
     wind: Wind,
@@ -110,7 +112,8 @@ impl<'a> Longitudinal<'a> {
             friction: 1.0 + at(P::Friction),
             engine_brake: 1.0 + at(P::EngineBrakeScale),
             fan_w,
-            efficiency: driveline.efficiency_frac() * (1.0 - at(P::DrivelineLoss)),
+            efficiency: driveline.direct_efficiency_frac() * (1.0 - at(P::DrivelineLoss)),
+            mesh_loss: driveline.mesh_loss_frac + at(P::MeshLoss),
             cd_a_m2: resistance.drag_area_m2 * (1.0 + at(P::Drag)),
             drag_yaw_1_rad: resistance.drag_yaw_1_rad,
             wind: Wind::new(plant, t),
@@ -155,7 +158,11 @@ impl<'a> Longitudinal<'a> {
                 net[j] -= self.fan_w * fan[j] * per_w[j];
             }
         }
-        let mut force: [f64; L] = lanes(|j| with_losses_n(net[j] * ratio[j], self.efficiency));
+        let meshes = cut::<L>(&d.meshes, at);
+        let mut force: [f64; L] = lanes(|j| {
+            let efficiency = self.efficiency * (1.0 - self.mesh_loss * meshes[j]);
+            with_losses_n(net[j] * ratio[j], efficiency)
+        });
         let air = self.air(at, v);
         let mut cold = [1.0; L];
         if let Some(left) = &self.cold_left {

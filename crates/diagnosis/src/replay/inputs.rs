@@ -10,6 +10,9 @@ use crate::Plant;
 /// Speed below which a measured ratio says nothing, m/s.
 const LEAST_M_S: f64 = 1.0;
 
+/// A measured ratio this close to 1 is that of a direct gear: gears are 1.2 to 1.3 apart.
+const DIRECT_WITHIN: f64 = 0.1;
+
 /// Samples that are computed side by side.
 pub(super) const BLOCK: usize = 64;
 
@@ -28,6 +31,8 @@ pub(crate) struct Inputs {
     /// Ratio engine to wheel over wheel radius, 1/m.
     pub(super) ratio_1_m: Vec<f64>,
     pub(super) rotating_kg: Vec<f64>,
+    /// 1 where teeth carry the power, 0 in a direct gear.
+    pub(super) meshes: Vec<f64>,
     pub(super) density: Vec<f64>,
     /// Cosine of the grade.
     pub(super) cos: Vec<f64>,
@@ -54,7 +59,7 @@ impl Inputs {
             let wheel_kg = driveline.rotating_mass_kg(0.0, 0);
             (ratio_1_m, wheel_kg + truck.engine.inertia_kg_m2 * ratio_1_m * ratio_1_m)
         };
-        let per_gear: Vec<(f64, f64)> = (0..=driveline.gear_ratios.len() as u8)
+        let per_gear: Vec<(f64, f64)> = (0..=driveline.top_gear())
             .map(|g| {
                 let rotating_kg = driveline.rotating_mass_kg(truck.engine.inertia_kg_m2, g);
                 (driveline.total_ratio(g) / driveline.wheel_radius_m, rotating_kg)
@@ -63,6 +68,12 @@ impl Inputs {
         let gear = |i: usize| match d.measured_ratio {
             true => measured(i),
             false => per_gear[if d.gear[i] < per_gear.len() { d.gear[i] } else { 0 }],
+        };
+        let direct: Vec<bool> =
+            (0..=driveline.top_gear()).map(|g| driveline.is_direct(g)).collect();
+        let passes_through = |i: usize| match d.measured_ratio {
+            true => (measured(i).0 / driveline.shaft_force_n(1.0) - 1.0).abs() < DIRECT_WITHIN,
+            false => direct.get(d.gear[i]).copied().unwrap_or(false),
         };
         let holding = induced_n(d, plant);
         let padded = d.n.next_multiple_of(BLOCK);
@@ -77,6 +88,7 @@ impl Inputs {
             engine_brake_nm: of(&|i| d.engine_brake[i] * engine.engine_brake_nm(d.omega[i])),
             ratio_1_m: of(&|i| gear(i).0),
             rotating_kg: of(&|i| gear(i).1),
+            meshes: of(&|i| if passes_through(i) { 0.0 } else { 1.0 }),
             density: of(&|i| d.density[i]),
             cos: of(&|i| d.slope[i]),
             rolling_by_speed: of(&|i| truck.resistance.rolling_per_speed_s_m * d.speed[i]),

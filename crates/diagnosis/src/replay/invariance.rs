@@ -16,7 +16,7 @@ use crate::{Cause, Drive, Parameter, extend};
 /// coolant, descents on stages of the engine brake, brakes that grow hot, curves, cold tyres.
 fn signals(truck: &TruckParameters) -> Drive {
     let n = 10 * 60 * 20;
-    let gear = truck.driveline.gear_ratios.len() as u8 - 1;
+    let gear = truck.driveline.top_gear() - 1;
     let per_speed = truck.driveline.engine_speed_rad_s(1.0, gear) * tractrix_core::RPM_PER_RAD_S;
     // Where the engine runs well in that gear.
     let usual_m_s = 1_300.0 / per_speed;
@@ -77,7 +77,7 @@ fn part(h: &Hypothesis, part: f64) -> (Theta, Cause) {
         let s = p.spec();
         let x = match p {
             P::StiffnessFollows | P::StiffnessFollowsMass | P::FuelLowOver => 1.0,
-            P::SteerDelay | P::RetarderSaturation => 0.0,
+            P::SteerDelay | P::PedalLag | P::RetarderSaturation => 0.0,
             _ => part * s.prior,
         };
         theta[p as usize] = x;

@@ -175,6 +175,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::WarmupAmp
         | P::WarmupTau
         | P::DrivelineLoss
+        | P::MeshLoss
         | P::FanPower
         | P::FanStart
         | P::DragBrake
@@ -208,6 +209,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::TurboLag
         | P::TurboStart
         | P::PedalDelay
+        | P::PedalLag
         | P::TorqueReport => &[G::Torque],
         P::ShiftTime => &[G::Shift],
         P::FuelLow | P::FuelLowLoad | P::FuelLowOver | P::FuelScale | P::FuelLag => &[G::Fuel],

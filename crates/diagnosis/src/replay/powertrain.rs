@@ -20,7 +20,6 @@ const COOLANT_DEGC: f64 = 98.0;
 pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Torque as usize];
     let (engine, file) = (&plant.control, &plant.truck.engine);
-    let delay = (file.pedal_delay_s + t[P::PedalDelay as usize]) / Drive::STEP_S;
     let rise = Rise {
         fast_s: file.fast_lag_s,
         slow_s: (file.slow_lag_s + t[P::TurboLag as usize]).max(0.02),
@@ -28,9 +27,7 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let from = (file.lag_threshold_frac + t[P::TurboStart as usize]).max(0.0);
     let keep = [rise.fast_s, rise.slow_s].map(|lag| (-Drive::STEP_S / lag).exp());
     let percent = 100.0 / file.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
-    let pedal = d.profiles.get(Kind::Pedal, [delay], || {
-        (0..d.n).map(|i| at_index(&d.pedal, i as f64 - delay)).collect()
-    });
+    let pedal = late_pedal(d, file.pedal_delay_s, t);
     let derating = Derating::new(d, plant, t);
     let mut out = vec![0.0; valid.len()];
     let mut torque = 0.0;
@@ -61,6 +58,21 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
         }
     }
     out
+}
+
+/// Pedal after its delay: later, or followed slowly, by the part of the fitted delay that is a lag.
+fn late_pedal(d: &Prepared, file_s: f64, t: &Theta) -> Arc<[f64]> {
+    let extra_s = t[P::PedalDelay as usize];
+    let lag_s = (t[P::PedalLag as usize] * extra_s).max(0.0);
+    let dead = (file_s + extra_s - lag_s) / Drive::STEP_S;
+    d.profiles.get(Kind::Pedal, [dead, lag_s], || {
+        let late = |i: usize, before: f64| at_index(&d.pedal, i as f64 - before - dead);
+        if lag_s == 0.0 {
+            return (0..d.n).map(|i| late(i, 0.0)).collect();
+        }
+        // What a lag follows over a sample is the mean over it.
+        followed((0..d.n).map(|i| late(i, 0.5)), late(0, 0.0), lag_s)
+    })
 }
 
 /// Lags of the torque on its way up, s.
@@ -129,13 +141,17 @@ fn overheat(d: &Prepared, from_degc: f64, lag_s: f64) -> Arc<[f64]> {
 /// A temperature above a threshold, K, followed with a lag up and down: protection that jumped would
 /// be felt as a jerk.
 fn followed_k(degc: &[f64], from_degc: f64, lag_s: f64) -> Vec<f64> {
+    followed(degc.iter().map(|degc| (degc - from_degc).max(0.0)), 0.0, lag_s)
+}
+
+/// A signal that is followed with a lag from a value on.
+fn followed(signal: impl Iterator<Item = f64>, from: f64, lag_s: f64) -> Vec<f64> {
     let keep = if lag_s > 0.0 { (-Drive::STEP_S / lag_s).exp() } else { 0.0 };
-    let mut followed_k = 0.0;
-    degc.iter()
-        .map(|degc| {
-            let over_k = (degc - from_degc).max(0.0);
-            followed_k = over_k + (followed_k - over_k) * keep;
-            followed_k
+    let mut now = from;
+    signal
+        .map(|x| {
+            now = x + (now - x) * keep;
+            now
         })
         .collect()
 }
@@ -240,6 +256,37 @@ mod tests {
         }
         let left = (-1_000.0 * Drive::STEP_S / 20.0).exp();
         assert!((lagged[1_999] - lagged[999] * left).abs() < 1e-9 && at_once[1_999] == 0.0);
+    }
+
+    /// A ramp comes later by the whole delay, whatever part of it is a lag; a step says which part.
+    #[test]
+    fn a_delay_of_the_pedal_is_a_dead_time_a_lag_or_both() {
+        let n = 400;
+        let truck = dynamics::TruckParameters::load("reference").unwrap();
+        let plant = Plant::of_truck(&truck).unwrap();
+        let late = |pedal: &dyn Fn(f64) -> f64, lag_frac: f64| {
+            let mut drive = Drive::new("pedal", 0.0, n);
+            let times = (0..n).map(|i| i as f64 * Drive::STEP_S);
+            drive.set(crate::Channel::AcceleratorPedalFrac, times.map(pedal).collect());
+            drive.set(crate::Channel::SpeedMS, vec![20.0; n]);
+            let mut theta = [0.0; crate::param::PARAMS];
+            theta[P::PedalDelay as usize] = 0.3;
+            theta[P::PedalLag as usize] = lag_frac;
+            late_pedal(&Prepared::new(&drive, &plant), 0.1, &theta)
+        };
+        for lag_frac in [0.0, 0.5, 1.0] {
+            let ramp = late(&|t| 0.04 * t, lag_frac);
+            assert!((ramp[300] - 0.04 * (15.0 - 0.4)).abs() < 1e-4, "{lag_frac}: {}", ramp[300]);
+            let step = late(&|t| if t < 5.0 { 0.0 } else { 0.8 }, lag_frac);
+            let lag_s = 0.3 * lag_frac;
+            let over = (9.0 - 5.0 - 0.4 + lag_s).max(0.0);
+            let rest = if lag_s > 0.0 { (-over / lag_s).exp() } else { 0.0 };
+            assert!((step[180] - 0.8 * (1.0 - rest)).abs() < 0.01);
+            let soon = step[112];
+            // 0.6 s after the step, 0.2 s after a dead time alone would have passed.
+            let expected = if lag_s > 0.0 { 1.0 - (-(0.2 + lag_s) / lag_s).exp() } else { 1.0 };
+            assert!((soon / 0.8 - expected).abs() < 0.06, "{lag_frac}: {soon}");
+        }
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub(super) enum Kind {
     Willans,
     /// Torque over full load, or what else may be low; over the lag and the choice.
     Load,
-    /// Pedal after its dead time.
+    /// Pedal after its dead time, followed with a lag; over both.
     Pedal,
     /// Coolant above where derating begins, K; over that temperature and the lag.
     Overheat,

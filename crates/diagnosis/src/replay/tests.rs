@@ -190,11 +190,23 @@ fn noise_of_the_torque_message_is_no_lag_of_the_fuel() {
     assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
 }
 
+/// Under power a loss of the teeth takes speed in the gears that have teeth in mesh, and none in the
+/// direct one.
+#[test]
+fn teeth_hold_back_in_all_gears_but_the_direct_one() {
+    let truck = TruckParameters::load("reference").unwrap();
+    let direct = f64::from(truck.driveline.top_gear());
+    let pulls = [(C::Gear, direct - 1.0, direct), (C::EngineTorquePercent, 60.0, 60.0)];
+    let held = held_back(&[(P::MeshLoss, 0.02)], 20 * 20, &pulls);
+    assert!(held[..19].iter().all(|x| (0.003..0.02).contains(x)), "{:?}", &held[..19]);
+    assert!(held[21..].iter().all(|x| *x == 0.0), "{:?}", &held[21..]);
+}
+
 /// What a retarder holds back in each second of a drive at 20 m/s, m/s: some channels change at `begins`.
 fn held_back(theta: &[(P, f64)], begins: usize, changes: &[(C, f64, f64)]) -> Vec<f64> {
     let truck = TruckParameters::load("reference").unwrap();
     let plant = Plant::of_truck(&truck).unwrap();
-    let gear = truck.driveline.gear_ratios.len() as u8 - 1;
+    let gear = truck.driveline.top_gear() - 1;
     let rpm = truck.driveline.engine_speed_rad_s(20.0, gear) * RPM_PER_RAD_S;
     let n = 40 * 20;
     let mut drive = Drive::new("steady", 0.0, n);

@@ -92,6 +92,7 @@ pub(crate) fn drive(
     let (mut gear_rad, mut delta, mut offset) = (0.0_f64, 0.0_f64, 0.0_f64);
     let (mut pressure, mut brake_k, mut coolant) = (0.0_f64, 0.0_f64, 80.0_f64);
     let (mut pedals, mut demands, mut wheels) = (Delay::new(), Delay::new(), Delay::new());
+    let mut pedal = 0.0;
     let mut memory = Memory::default();
     for i in 0..samples * 5 {
         let time_s = i as f64 * STEP_S;
@@ -135,7 +136,8 @@ pub(crate) fn drive(
             }
         }
         // Engine and gearbox.
-        let pedal = pedals.put(driver.pedal, f.pedal_delay_s);
+        let late = pedals.put(driver.pedal, f.pedal_delay_s);
+        pedal += (late - pedal) * (1.0 - (-STEP_S / f.pedal_lag_s.max(1e-6)).exp());
         let slowing = driver.stage > 0.0 || driver.xbr > 0.0;
         train.turn(v, driver.pedal, slowing, f.shift_extra_s + a.shift_s, rng, STEP_S);
         train.fuel_up(&f, pedal, a.derate, a.demand, STEP_S);
@@ -146,8 +148,9 @@ pub(crate) fn drive(
             - a.crank_nm
             - driver.stage * engine_brake(train.rpm) * f.engine_brake_scale;
         let passed = net * train.closed();
+        let efficiency = f.efficiency * if train.gear == 12 { 1.0 } else { 1.0 - f.mesh_loss };
         let drive_n =
-            passed * train.per_m() * if passed > 0.0 { f.efficiency } else { 1.0 / f.efficiency };
+            passed * train.per_m() * if passed > 0.0 { efficiency } else { 1.0 / efficiency };
         // Brakes.
         let demand = demands.put(driver.xbr, f.brake_delay_s) * sheet_kg / 400.0 * a.pressure[0]
             + if driver.xbr > 0.0 { a.pressure[1] } else { 0.0 };

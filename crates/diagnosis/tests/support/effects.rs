@@ -123,14 +123,22 @@ pub(crate) fn apply(f: &mut Figures, effects: &[Effect]) {
             }
             "grade_bias" => f.grade_bias += x,
             "map_shift" => f.map_shift_m += x,
-            "driveline_loss" => f.efficiency *= 1.0 - x,
+            // An axle loses in all gears, a gearbox more where its teeth carry the power.
+            "driveline_loss" => {
+                f.efficiency *= 1.0 - x;
+                f.mesh_loss = if shape.choice(0, 2) == 0 { 0.0 } else { x * shape.at(1, 0.0, 0.8) };
+            }
             "dragging_brake" => f.drag_force_n += x,
             "engine_friction" => f.friction_scale *= 1.0 + x,
             "turbo_lag" => {
                 f.boost_lag_s += x;
                 f.boost_from = shape.at(0, 0.27, 0.43);
             }
-            "pedal_delay" => f.pedal_delay_s += x,
+            "pedal_delay" => {
+                let lag_s = if shape.choice(0, 2) == 0 { 0.0 } else { x * shape.at(1, 0.3, 0.8) };
+                f.pedal_delay_s += x - lag_s;
+                f.pedal_lag_s = lag_s;
+            }
             "shift_duration" => f.shift_extra_s += x,
             "brake_gain" => f.brake_scale *= 1.0 + x,
             "brake_delay" => f.brake_delay_s += x,

@@ -26,6 +26,10 @@ pub struct DrivelineParameters {
     /// Factor on the driveline's losses, 1 = as given.
     #[serde(default = "one")]
     pub loss_scale_coeff: f64,
+    /// Share of the power that the gears lose on top whose teeth carry it: all but the direct one, whose
+    /// ratio is 1 and which passes the shaft straight through.
+    #[serde(default)]
+    pub mesh_loss_frac: f64,
     /// Dynamic wheel radius, m.
     pub wheel_radius_m: f64,
     /// Inertia of all wheels, kg m².
@@ -63,6 +67,9 @@ pub struct DrivelineParameters {
 
 /// Pedal below which the accelerator counts as released.
 pub const RELEASED_PEDAL_FRAC: f64 = 0.01;
+
+/// A ratio this close to 1 is that of a direct gear.
+const DIRECT_WITHIN: f64 = 1e-3;
 
 /// Share of a torque that acts from a speed on, rising over one metre per second about it (own form:
 /// a controller switches, a fit needs a slope).
@@ -104,6 +111,7 @@ impl DrivelineParameters {
         b.within("gearbox_efficiency_frac", self.gearbox_efficiency_frac, 0.5, 1.0);
         b.within("axle_efficiency_frac", self.axle_efficiency_frac, 0.5, 1.0);
         b.within("loss_scale_coeff", self.loss_scale_coeff, 0.0, 5.0);
+        b.within("mesh_loss_frac", self.mesh_loss_frac, -0.05, 0.3);
         b.within("wheel_radius_m", self.wheel_radius_m, 0.2, 1.0);
         b.within("wheel_inertia_kg_m2", self.wheel_inertia_kg_m2, 0.0, 2_000.0);
         b.within("clutch_torque_nm", self.clutch_torque_nm, 100.0, 20_000.0);
@@ -126,18 +134,38 @@ impl DrivelineParameters {
         self.gear_ratios.get(i).map_or(0.0, |g| g * self.final_drive_ratio)
     }
 
-    /// Efficiency engine to wheel.
+    /// Efficiency engine to wheel in a gear (1-based).
     #[must_use]
-    pub fn efficiency_frac(&self) -> f64 {
+    pub fn efficiency_frac(&self, gear: u8) -> f64 {
+        let mesh = if self.is_direct(gear) { 1.0 } else { 1.0 - self.mesh_loss_frac };
+        (self.direct_efficiency_frac() * mesh).clamp(0.05, 1.0)
+    }
+
+    /// Efficiency engine to wheel without what gears lose whose teeth carry the power.
+    #[must_use]
+    pub fn direct_efficiency_frac(&self) -> f64 {
         let loss = 1.0 - self.gearbox_efficiency_frac * self.axle_efficiency_frac;
         (1.0 - self.loss_scale_coeff * loss).clamp(0.05, 1.0)
+    }
+
+    /// Whether a gear passes the shaft straight through.
+    #[must_use]
+    pub fn is_direct(&self, gear: u8) -> bool {
+        let i = usize::from(gear).wrapping_sub(1);
+        self.gear_ratios.get(i).is_some_and(|r| (r - 1.0).abs() < DIRECT_WITHIN)
+    }
+
+    /// The highest gear.
+    #[must_use]
+    pub fn top_gear(&self) -> u8 {
+        self.gear_ratios.len() as u8
     }
 
     /// Wheel force of a crank torque through a gear, N.
     #[must_use]
     pub fn force_n(&self, crank_nm: f64, gear: u8) -> f64 {
         let raw = crank_nm * self.total_ratio(gear) / self.wheel_radius_m;
-        with_losses_n(raw, self.efficiency_frac())
+        with_losses_n(raw, self.efficiency_frac(gear))
     }
 
     /// Engine speed with the clutch closed, rad/s.
@@ -181,5 +209,30 @@ impl DrivelineParameters {
     #[must_use]
     pub fn shaft_force_n(&self, shaft_nm: f64) -> f64 {
         shaft_nm * self.final_drive_ratio / self.wheel_radius_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::TruckParameters;
+
+    /// A countershaft gearbox carries the power by two pairs of teeth in all gears but the direct one.
+    #[test]
+    fn teeth_lose_in_all_gears_but_the_direct_one() {
+        let truck = TruckParameters::load("reference").unwrap();
+        let worn = truck.with_parameter("driveline.mesh_loss_frac", 0.02).unwrap();
+        let (own, d) = (&truck.driveline, &worn.driveline);
+        let direct = d.top_gear();
+        assert!(d.is_direct(direct) && !d.is_direct(direct - 1) && !d.is_direct(0));
+        assert_eq!(d.efficiency_frac(direct), own.efficiency_frac(direct));
+        for gear in 1..direct {
+            let kept = d.efficiency_frac(gear) / own.efficiency_frac(gear);
+            assert!((kept - 0.98).abs() < 1e-12);
+            // Driving takes, braking adds.
+            assert!((d.force_n(500.0, gear) / own.force_n(500.0, gear) - 0.98).abs() < 1e-12);
+            assert!(
+                (d.force_n(-500.0, gear) / own.force_n(-500.0, gear) - 1.0 / 0.98).abs() < 1e-12
+            );
+        }
     }
 }

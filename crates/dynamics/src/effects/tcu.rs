@@ -60,8 +60,8 @@ pub struct TcuView<'a> {
     pub open_accel_m_s2: f64,
     /// Mass, kg.
     pub mass_kg: f64,
-    /// Efficiency engine to wheel.
-    pub efficiency_frac: f64,
+    /// Efficiency engine to wheel in each gear.
+    pub efficiency_frac: &'a [f64],
     /// Pedal, 0 to 1.
     pub pedal_frac: f64,
     /// Engine brake and retarder demand, 0 to 1.
@@ -144,7 +144,8 @@ impl Outlook<'_> {
         let ratio = self.view.ratio_rad_m[gear - 1];
         let n = (self.gap_m_s * ratio).max(self.view.idle_rad_s);
         let load = self.load_frac(gear, self.gap_m_s).min(1.0);
-        let force_n = load * self.view.full_load_nm.at(n) * ratio * self.view.efficiency_frac;
+        let efficiency = self.view.efficiency_frac[gear - 1];
+        let force_n = load * self.view.full_load_nm.at(n) * ratio * efficiency;
         let accel = self.view.open_accel_m_s2 + force_n / self.view.mass_kg;
         (self.gap_m_s + accel * self.p.hold_s).max(0.0)
     }

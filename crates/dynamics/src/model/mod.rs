@@ -45,6 +45,8 @@ pub struct TruckModel {
     tables: Vec<(TableSignal, Curve)>,
     /// Engine speed per road speed in each gear, rad/m.
     ratio_rad_m: Vec<f64>,
+    /// Efficiency engine to wheel in each gear.
+    efficiency_frac: Vec<f64>,
     pedal_steps: u8,
     brake_steps: u8,
 }
@@ -77,14 +79,16 @@ impl TruckModel {
         let tables = tables.map_err(|e| refuse(&name, e.to_string()))?;
         let axle_load_n = parameters.lateral.static_axle_load_n();
         let total: f64 = axle_load_n.iter().sum();
-        let gears = parameters.driveline.gear_ratios.len() as u8;
+        let gears = 1..=parameters.driveline.top_gear();
         let steps = |s: f64| libm::round(s / SUBSTEP_S).clamp(0.0, 127.0) as u8;
         Ok(Self {
             mass_kg: parameters.lateral.total_mass_kg(),
             brake_share: GROUP_AXLES.map(|r| axle_load_n[r].iter().sum::<f64>() / total),
-            ratio_rad_m: (1..=gears)
+            ratio_rad_m: gears
+                .clone()
                 .map(|g| parameters.driveline.engine_speed_rad_s(1.0, g))
                 .collect(),
+            efficiency_frac: gears.map(|g| parameters.driveline.efficiency_frac(g)).collect(),
             pedal_steps: steps(parameters.engine.pedal_delay_s),
             brake_steps: steps(parameters.brake.dead_time_s),
             engine,

@@ -98,7 +98,7 @@ impl TruckModel {
             accel_m_s2: s.accel_m_s2,
             open_accel_m_s2: free_n / self.mass_kg,
             mass_kg: self.mass_kg,
-            efficiency_frac: d.efficiency_frac(),
+            efficiency_frac: &self.efficiency_frac,
             pedal_frac: pedal,
             retarder_frac: command.retarder_frac,
             brake_decel_m_s2: decel,
