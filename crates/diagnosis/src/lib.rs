@@ -18,96 +18,54 @@
 //! Pure: drives, time, seeds and the [`Executor`] are arguments; only `read` and `from_log` open files
 //! that they are given.
 //!
-//! | room | files |
+//! | room | what is in it |
 //! |---|---|
-//! | data | `channel`, `drive`, `read`, `from_log`, `index`, `table`, `finding`, `plausible`, `clock` |
-//! | causes | `hypothesis`, `param`, `sentence`; physics and words stand in `dynamics::catalogue` |
-//! | replay | `plant`, `replay`, `signal`, `parts` |
-//! | problem | `problem`, `course`, `baseline`, `stats` |
-//! | search | `decisions`, `evidence`, `screen`, `fit`, `free`, `refit`, `search`, `gate`, `held_out`, `worth`, `weights` |
-//! | outside the catalogue | `unknown`, `catch_all`, `sure` |
-//! | answer | `diagnosis`, `causes`, `wrong`, `observable`, `detectable`, `gain`, `verdict`, `overlay` |
-//! | run | `outcome`, `report`, `drive_use`, `table_trial`, `executor` |
-//! | studies | `identify`, `experiment` with `logger` (simulated), `fidelity`, `whole_run`, `lateral_id` |
+//! | `data` | measured drives: columns, readers, logs of a bus, clocks, defects |
+//! | `causes` | hypotheses and their parameters; physics and words stand in [`dynamics::catalogue`] |
+//! | `replay` | every module of the truck model driven by measured signals: residuals |
+//! | `problem` | a set of drives in one metric: tolerances, courses, what a baseline teaches |
+//! | `search` | from nothing to a set of causes, by evidence |
+//! | `outside` | what the catalogue does not have |
+//! | `answer` | causes with probabilities, gain, the extended truck, the verdict |
+//! | `run` | the whole loop and what goes into its files |
+//! | `studies` | `identify`, `experiment`, fidelity, tyre laws |
 #![cfg_attr(test, allow(clippy::indexing_slicing))]
 
-mod baseline;
-mod catch_all;
+mod answer;
 mod causes;
-mod channel;
-pub mod clock;
-mod course;
-mod decisions;
-mod detectable;
-mod diagnosis;
-mod drive;
-mod drive_use;
+mod data;
 mod error;
-mod evidence;
-mod executor;
-pub mod experiment;
-pub mod fidelity;
-mod finding;
-pub mod fit;
-mod free;
-pub mod from_log;
-mod gain;
-mod gate;
-mod held_out;
-mod hypothesis;
-pub mod identify;
-mod index;
-pub mod lateral_id;
-pub mod logger;
-mod observable;
-mod outcome;
-mod overlay;
-mod param;
-mod parts;
-mod plant;
-mod plausible;
+mod outside;
 mod problem;
-mod read;
-mod refit;
 mod replay;
-pub mod report;
-mod report_models;
-mod screen;
+mod run;
 mod search;
-mod sentence;
-mod signal;
-mod stats;
-mod sure;
-mod table;
-mod table_trial;
-mod unknown;
-mod verdict;
-mod weights;
-mod whole_run;
-mod worth;
-mod wrong;
+mod studies;
 
-pub use baseline::Baseline;
-pub use channel::Channel;
-pub use detectable::Detectable;
-pub use diagnosis::{Options, Progress, diagnose, diagnose_with};
-pub use drive::{CoastDown, Drive, DriveSet, RoadMap};
-pub use drive_use::{DriveRole, DriveUse, SizeAlone};
-pub use dynamics::catalogue::CauseKind;
-pub use error::DiagnosisError;
-pub use executor::{Executor, Serial, collect};
-pub use finding::{Action, Finding, FindingKind};
-pub use index::drives_index;
-pub use outcome::{Outcome, Request, file_name};
-pub use overlay::{Extension, extend};
-pub use plant::Plant;
-pub use read::{RawTable, read_drives, read_drives_with, read_table, read_traces};
-pub use replay::Module;
-pub use report_models::Models;
-pub use table::Table;
-pub use table_trial::{TableTrial, try_table};
-pub use verdict::{
+pub use answer::detectable::Detectable;
+pub use answer::overlay::{Extension, extend};
+pub use answer::verdict::{
     BeforeAfter, Cause, Confusion, Diagnosis, Gain, NotObservable, Parameter, SideForcePoint,
     Unknown, Verdict, Wrong,
 };
-pub use whole_run::{Trace, whole_run};
+pub use data::channel::Channel;
+pub use data::drive::{CoastDown, Drive, DriveSet, RoadMap};
+pub use data::finding::{Action, Finding, FindingKind};
+pub use data::index::drives_index;
+pub use data::read::{RawTable, read_drives, read_drives_with, read_table, read_traces};
+pub use data::table::Table;
+pub use data::{clock, from_log};
+pub use dynamics::catalogue::CauseKind;
+pub use error::DiagnosisError;
+pub use problem::baseline::Baseline;
+pub use replay::Module;
+pub use replay::plant::Plant;
+pub use run::diagnose::{Options, Progress, diagnose, diagnose_with};
+pub use run::drive_use::{DriveRole, DriveUse, SizeAlone};
+pub use run::executor::{Executor, Serial, collect};
+pub use run::outcome::{Outcome, Request, file_name};
+pub use run::report;
+pub use run::report_models::Models;
+pub use run::table_trial::{TableTrial, try_table};
+pub use studies::whole_run::{Trace, whole_run};
+pub use studies::{experiment, fidelity, fit, identify, lateral_id, logger};

@@ -10,9 +10,10 @@ use nalgebra::{DMatrix, DVector};
 use super::nuisance::Changed;
 use super::signals::Line;
 use super::{Direction, Problem, Reference, nuisance_directions};
-use crate::decisions::MIN_EVIDENCE;
-use crate::param::{P, Theta};
-use crate::{DiagnosisError, Plant, SideForcePoint, sentence};
+use crate::causes::param::{P, Theta};
+use crate::causes::sentence;
+use crate::search::decisions::MIN_EVIDENCE;
+use crate::{DiagnosisError, Plant, SideForcePoint};
 
 /// The tractor's part and how far behind its CG the trailer's part acts, off the truck file's.
 const POINT: [P; 2] = [P::SideShare, P::SideBehind];

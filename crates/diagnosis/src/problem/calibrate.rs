@@ -5,11 +5,11 @@ use nalgebra::{DMatrix, DVector};
 use super::nuisance::Changed;
 use super::{Direction, Problem, Reference, nuisance_directions, replay};
 use crate::DiagnosisError;
-use crate::decisions::{FREE_FORM_NATS, MEAN_PRIOR, SCATTER_PRIOR};
-use crate::hypothesis::CATALOGUE;
-use crate::param::{P, PARAMS, SPECS, Theta};
+use crate::causes::hypothesis::CATALOGUE;
+use crate::causes::param::{P, PARAMS, SPECS, Theta};
+use crate::problem::stats::whiten::Whitener;
 use crate::replay::{MODULES, Module, Prepared, Residuals};
-use crate::stats::whiten::Whitener;
+use crate::search::decisions::{FREE_FORM_NATS, MEAN_PRIOR, SCATTER_PRIOR};
 
 const SCATTER_ROUNDS: usize = 25;
 /// Times that tolerances are moved to where their drives have them.
@@ -94,7 +94,7 @@ impl Problem<'_> {
     /// mean is what this truck and its weather are like when all is well (a crosswind of any sign
     /// adds drag): causes count from there.
     pub(super) fn scatter(&mut self) {
-        let specs: Vec<&crate::param::Spec> =
+        let specs: Vec<&crate::causes::param::Spec> =
             nuisance_directions(&self.reference.tolerance).iter().map(|d| d.p.spec()).collect();
         let systems: Vec<(DMatrix<f64>, DVector<f64>)> = (0..self.drives.len())
             .map(|i| {
@@ -167,7 +167,7 @@ impl Problem<'_> {
         &self,
         theta: &mut Theta,
         best: &mut f64,
-        free: &[&crate::param::Spec],
+        free: &[&crate::causes::param::Spec],
         cost: &dyn Fn(f64, &Theta) -> f64,
     ) {
         for s in free.iter().filter(|s| s.unit == "s") {
@@ -215,7 +215,8 @@ impl Problem<'_> {
 
     /// Gauss-Newton steps of the common calibration.
     pub(super) fn calibrate(&mut self, first: bool) -> Result<(), DiagnosisError> {
-        let free: Vec<&crate::param::Spec> = SPECS.iter().filter(|s| s.calibration > 0.0).collect();
+        let free: Vec<&crate::causes::param::Spec> =
+            SPECS.iter().filter(|s| s.calibration > 0.0).collect();
         let directions: Vec<Direction> =
             free.iter().map(|s| Direction::new(s.p, Vec::new(), 0.3 * s.step)).collect();
         let cost = |norm: f64, t: &Theta| {

@@ -6,9 +6,9 @@ use nalgebra::{DMatrix, DVector};
 
 use super::signals::Line;
 use super::{Direction, Problem, Rest};
-use crate::param::Theta;
+use crate::causes::param::Theta;
+use crate::outside::unknown::KNOTS;
 use crate::replay::Module;
-use crate::unknown::KNOTS;
 
 /// Marginal Gram matrix per drive over `[r, columns]`.
 ///

@@ -1,11 +1,11 @@
-//! Hat functions of a signal over the rows of a module, for the [course](crate::course) of causes.
+//! Hat functions of a signal over the rows of a module, for the [course](crate::problem::course) of causes.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use super::{Hat, Problem};
 use crate::replay::Module;
-use crate::signal::{SIGNALS, means};
+use crate::replay::signal::{SIGNALS, means};
 
 /// Part of the rows below the first and above the last knot.
 const TAIL: f64 = 0.02;

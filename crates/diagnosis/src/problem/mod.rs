@@ -5,12 +5,15 @@
 //! deviations. Everything that the search needs is a Gram matrix in `M`, kept per drive.
 
 mod attack;
+pub(crate) mod baseline;
 mod calibrate;
+pub(crate) mod course;
 mod gram;
 mod hat;
 mod moved;
 mod nuisance;
 mod signals;
+pub(crate) mod stats;
 
 pub(crate) use gram::Gram;
 pub(crate) use moved::moves;
@@ -26,10 +29,10 @@ use std::sync::Arc;
 
 use nalgebra::DMatrix;
 
-use crate::course::Point;
-use crate::param::{P, PARAMS, SPECS, Theta};
+use crate::causes::param::{P, PARAMS, SPECS, Theta};
+use crate::problem::course::Point;
+use crate::problem::stats::whiten::Whitener;
 use crate::replay::{GROUPS, MODULES, Prepared, Residuals, replay_group};
-use crate::stats::whiten::Whitener;
 use crate::{DiagnosisError, Executor, Plant, collect};
 
 /// Tolerances, calibration and noise of a truck and its logger.
@@ -86,7 +89,7 @@ pub(crate) struct Direction {
 /// One of some hat functions over a signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Hat {
-    /// Index into [`SIGNALS`](crate::signal::SIGNALS).
+    /// Index into [`SIGNALS`](crate::replay::signal::SIGNALS).
     pub(crate) signal: usize,
     /// Its number, and that of the last one.
     pub(crate) knot: usize,

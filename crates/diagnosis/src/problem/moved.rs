@@ -13,7 +13,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::signals::Line;
 use super::{Direction, Problem, nuisance_directions};
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 
 /// Shifts of which a drive keeps the column: those of the steps of one fit.
 const KEPT: usize = 4;

@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use super::signals::Line;
 use super::{Problem, inner, nuisance_directions};
 use crate::DiagnosisError;
-use crate::course::Point;
+use crate::problem::course::Point;
 use crate::replay::MODULES;
 
 /// Tolerances of one drive at the reference.

@@ -7,7 +7,7 @@ use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::{Direction, Problem, inner, moves};
-use crate::param::{SPECS, Theta};
+use crate::causes::param::{SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
 
 /// Residuals of one group at one point, or a sensitivity: minus the derivative of the residual.

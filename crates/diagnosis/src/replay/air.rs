@@ -5,7 +5,7 @@ use dynamics::effects::resistance::{on_course, side_n};
 use super::inputs::{BLOCK, Inputs, cut, lanes, scaled};
 use super::prepared::Prepared;
 use crate::Plant;
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 
 /// Wind as the parameters have it, m/s: along and across the truck, and over the map.
 pub(super) struct Wind {

@@ -4,7 +4,7 @@
 
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 use dynamics::SUBSTEP_S;
 use dynamics::effects::brake::BrakeParameters;
@@ -39,7 +39,7 @@ pub(super) fn resolved(d: &Prepared, plant: &Plant) -> Vec<f64> {
         return d.pressure.clone();
     }
     let modelled = |load_estimate: f64| {
-        let mut theta = [0.0; crate::param::PARAMS];
+        let mut theta = [0.0; crate::causes::param::PARAMS];
         theta[P::BrakeLoad as usize] = load_estimate;
         let mut chambers = Chambers::new(d, plant, &theta);
         (0..d.n).map(|i| chambers.step(i)).collect::<Vec<_>>()

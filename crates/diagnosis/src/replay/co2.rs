@@ -11,7 +11,7 @@ use dynamics::effects::instruments::scale_at_rate;
 use super::Module as M;
 use super::prepared::Prepared;
 use crate::Plant;
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 
 /// Samples of a row.
 pub(super) const WINDOW: usize = 300;
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::Channel as C;
     use crate::Drive;
-    use crate::param::PARAMS;
+    use crate::causes::param::PARAMS;
     use dynamics::TruckParameters;
 
     /// Half an hour of a fuel rate that wanders, reported by a meter that reads high with load and

@@ -15,7 +15,7 @@ use super::inputs::{BLOCK, Inputs, cut, lanes, pad, scaled};
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
 use super::retarder::{blended_m_s2, downhill, retarder_n};
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
 /// Samples that a speed at a window's end is averaged over (two 10 Hz messages).

@@ -107,7 +107,7 @@ impl Inputs {
 /// that of the load sheet without the file's factors: those are lateral figures, which the balance
 /// would only blur.
 fn induced_n(d: &Prepared, plant: &Plant) -> Vec<f64> {
-    let mut loaded = super::lateral::loaded(d, plant, &[0.0; crate::param::PARAMS]);
+    let mut loaded = super::lateral::loaded(d, plant, &[0.0; crate::causes::param::PARAMS]);
     loaded.tyres.stiffness_scale = [1.0; 3];
     let stiffness: f64 = loaded.tyres.stiffness_n_rad(&loaded.static_axle_load_n()).iter().sum();
     let lateral_m_s2 = d.speed.iter().zip(&d.yaw).map(|(v, yaw)| v * yaw);

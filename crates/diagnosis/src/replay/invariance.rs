@@ -8,7 +8,7 @@ use dynamics::TruckParameters;
 
 use super::*;
 use crate::Channel as C;
-use crate::hypothesis::{CATALOGUE, Hypothesis};
+use crate::causes::hypothesis::{CATALOGUE, Hypothesis};
 use crate::problem::resolution;
 use crate::{Cause, Drive, Parameter, extend};
 

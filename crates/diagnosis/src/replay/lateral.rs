@@ -11,7 +11,7 @@ use super::Module as M;
 use super::air::SideForce;
 use super::inputs::BLOCK;
 use super::prepared::{Prepared, at_index};
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
 /// Below this speed the linear model is stiff; rows there are masked.

@@ -12,6 +12,8 @@ mod engaged;
 pub(crate) mod force;
 mod inputs;
 mod lateral;
+pub(crate) mod parts;
+pub(crate) mod plant;
 mod powertrain;
 mod prepared;
 mod profiles;
@@ -19,6 +21,7 @@ mod retarder;
 mod rows;
 mod section;
 mod sensors;
+pub(crate) mod signal;
 mod smooth;
 
 pub(crate) use powertrain::{CRUISE_RPM, LOW_LOAD_FRAC};
@@ -26,7 +29,7 @@ pub(crate) use prepared::Prepared;
 pub(crate) use retarder::{RETARDER_LAG_S, RETARDER_POWER_W};
 
 use crate::Plant;
-use crate::param::{P, PARAMS, Theta};
+use crate::causes::param::{P, PARAMS, Theta};
 
 /// A residual channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -10,7 +10,7 @@ use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
 /// Coolant temperature from which an engine protects itself, degC.
@@ -269,7 +269,7 @@ mod tests {
             let times = (0..n).map(|i| i as f64 * Drive::STEP_S);
             drive.set(crate::Channel::AcceleratorPedalFrac, times.map(pedal).collect());
             drive.set(crate::Channel::SpeedMS, vec![20.0; n]);
-            let mut theta = [0.0; crate::param::PARAMS];
+            let mut theta = [0.0; crate::causes::param::PARAMS];
             theta[P::PedalDelay as usize] = 0.3;
             theta[P::PedalLag as usize] = lag_frac;
             late_pedal(&Prepared::new(&drive, &plant), 0.1, &theta)

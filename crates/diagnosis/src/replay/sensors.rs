@@ -5,7 +5,7 @@ use super::Module as M;
 use super::force::weak_form;
 use super::prepared::{Prepared, at_index, running_sum};
 use crate::Drive;
-use crate::param::{P, Theta};
+use crate::causes::param::{P, Theta};
 
 /// GPS speed minus true speed by the wheels, m/s, mean over half a second.
 pub(super) fn gps(d: &Prepared, t: &Theta) -> Vec<f64> {

@@ -1,0 +1,312 @@
+//! The course of a cause in this truck, and its scatter between drives.
+//!
+//! No truck has a cause exactly as the catalogue writes it: a fan does not turn by its law, a
+//! retarder gives more when it is cold, a payload lies elsewhere on the next trip. Beside its size
+//! `theta` a cause therefore has random effects of zero mean that vanish with it:
+//!
+//! ```text
+//! r_d = theta S_d + theta u_d S_d + theta sum_k w_k (S_d o B_k) + ...
+//! u_d ~ N(0, tau²)   of each drive for itself
+//! w_k ~ N(0, rho²)   of all drives together, B_k hat functions of a signal that drives the cause
+//! ```
+//! A wind has `w_k` of each drive for itself, over its time: weather swells and turns, and what blows
+//! aside of it goes with its whole length.
+//!
+//! (Kennedy and O'Hagan, J. R. Statist. Soc. B 63, 2001; here multiplicative.) What another cause
+//! would patch of the form of a large one is explained without it, and a size is known no better
+//! than its form.
+
+use dynamics::catalogue::Law;
+use nalgebra::{DMatrix, DVector};
+
+use crate::causes::hypothesis::{Along, CATALOGUE, Hypothesis};
+use crate::causes::param::{P, Theta};
+use crate::problem::{Direction, Gram, Hat};
+use crate::replay::signal::signal;
+use crate::search::decisions::{RHO, RHO_SHAPE, TAU, WEATHER};
+use crate::search::free::directions;
+use crate::search::refit::Fit;
+
+/// Hat functions along one signal.
+pub(crate) const HATS: usize = 4;
+/// Those of weather over the time of a drive: it changes within minutes (gusts of tens of seconds are
+/// noise, which drives in order have too).
+const OF_WEATHER: usize = 10;
+
+/// Signals along which the course of a cause with this size may differ, those that drive it, and its
+/// standard deviation there.
+pub(crate) fn signals(p: P) -> impl Iterator<Item = (&'static str, f64)> {
+    let own = CATALOGUE.iter().find(|h| h.sizes.contains(&p));
+    own.into_iter().flat_map(|h| h.course.iter().map(|along| (along.signal(), rho(h, along))))
+}
+
+/// Part of a cause that its form may differ by.
+pub(crate) fn form(h: &Hypothesis) -> f64 {
+    if h.of_truck().is_some_and(|c| c.law == Law::Chosen) { RHO_SHAPE } else { RHO }
+}
+
+fn rho(h: &Hypothesis, along: &Along) -> f64 {
+    match along {
+        Along::Open(_) => form(h),
+        Along::Fitted(_) => RHO,
+        Along::Weather(_) => WEATHER,
+    }
+}
+
+/// Is a size one of weather?
+fn weather(h: &Hypothesis) -> bool {
+    h.course.iter().any(|along| matches!(along, Along::Weather(_)))
+}
+
+/// Random effects of one size: columns of a Gram matrix (the residual is column 0).
+#[derive(Debug, Clone)]
+struct Effect {
+    p: P,
+    /// The cause that it is a size of.
+    of: &'static Hypothesis,
+    /// Its sensitivity.
+    column: usize,
+    /// Its hats per signal, with the deviation of its course there.
+    hats: Vec<(f64, Vec<usize>)>,
+}
+
+impl Effect {
+    /// Size that its effects go with: that of a wind goes to all sides.
+    fn size(&self, theta: &Theta, zero: &Theta) -> f64 {
+        let own = [self.p];
+        let of = if weather(self.of) { self.of.sizes } else { &own };
+        let squared = |p: &P| (theta[*p as usize] - zero[*p as usize]).powi(2);
+        of.iter().map(squared).sum::<f64>().sqrt()
+    }
+
+    /// Its scatter between drives, in its size.
+    fn between(&self) -> f64 {
+        if weather(self.of) { WEATHER } else { TAU }
+    }
+}
+
+/// Random effects of the sizes among some directions.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Course(Vec<Effect>);
+
+impl Course {
+    /// The effects of those of `directions` whose parameters are `sizes`; appends their hats.
+    pub(crate) fn of(sizes: &[P], directions: &mut Vec<Direction>) -> Self {
+        let mut out = Vec::new();
+        for j in 0..directions.len() {
+            let p = directions[j].p;
+            if !sizes.contains(&p) {
+                continue;
+            }
+            let Some(of) = CATALOGUE.iter().find(|h| h.sizes.contains(&p)) else { continue };
+            let mut hats = Vec::new();
+            let count = if weather(of) { OF_WEATHER } else { HATS };
+            for (name, rho) in signals(p) {
+                let Some(signal) = signal(name) else { continue };
+                let first = directions.len() + 1;
+                for knot in 0..count {
+                    let hat = Some(Hat { signal, knot, last: count - 1 });
+                    directions.push(Direction { hat, ..directions[j].clone() });
+                }
+                hats.push((rho, (first..first + count).collect()));
+            }
+            out.push(Effect { p, of, column: j + 1, hats });
+        }
+        Self(out)
+    }
+
+    /// The same in a matrix with `more` columns between the residual and the directions.
+    pub(crate) fn behind(&self, more: usize) -> Self {
+        let mut out = self.clone();
+        for e in &mut out.0 {
+            e.column += more;
+            e.hats.iter_mut().flat_map(|h| &mut h.1).for_each(|j| *j += more);
+        }
+        out
+    }
+
+    /// Standard deviations of the directions' random effects at `theta`, those of drives and those
+    /// common to all alike; 0 for those that have none.
+    pub(crate) fn deviations(&self, count: usize, theta: &Theta, zero: &Theta) -> Vec<f64> {
+        let mut out = vec![0.0; count];
+        for e in &self.0 {
+            let size = e.size(theta, zero);
+            out[e.column - 1] = e.between() * size;
+            for (rho, hats) in &e.hats {
+                hats.iter().for_each(|j| out[j - 1] = rho * size);
+            }
+        }
+        out
+    }
+
+    /// The same without the effects of some sizes.
+    pub(crate) fn without(&self, sizes: &[P]) -> Self {
+        Self(self.0.iter().filter(|e| !sizes.contains(&e.p)).cloned().collect())
+    }
+
+    /// The Gram matrix over the columns `keep` with these effects taken out, the sizes being those of
+    /// `theta` beyond `zero`. `None` where it is not positive definite.
+    ///
+    /// A course is one of what shows of a cause: where the tolerances can take a cause (a headwind is
+    /// almost a little more drag) but not its course, the course shows no more than the cause does.
+    /// Else any cause would bring a free function along for what trucks in order leave, too.
+    pub(crate) fn taken_out(
+        &self,
+        gram: &Gram,
+        keep: &[usize],
+        theta: &Theta,
+        zero: &Theta,
+    ) -> Option<Gram> {
+        let shows = |j: usize| gram.per_drive.iter().map(|g| g[(j, j)]).sum::<f64>();
+        let (mut between, mut along) = (Vec::new(), Vec::new());
+        for e in &self.0 {
+            let size = e.size(theta, zero);
+            between.push((e.column, e.between() * size));
+            for (rho, hats) in &e.hats {
+                let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
+                let part = (shows(e.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
+                let to = if weather(e.of) { &mut between } else { &mut along };
+                to.extend(hats.iter().map(|j| (*j, rho * size * part)));
+            }
+        }
+        gram.marginal(keep, &between, &along)
+    }
+}
+
+/// A point with the courses of the causes that are there: where what is left over is judged.
+pub(crate) struct Point {
+    pub(crate) theta: Theta,
+    pub(crate) directions: Vec<Direction>,
+    pub(crate) course: Course,
+}
+
+impl Point {
+    /// Without causes.
+    pub(crate) fn bare(theta: Theta) -> Self {
+        Self { theta, directions: Vec::new(), course: Course::default() }
+    }
+
+    pub(crate) fn of(fit: &Fit) -> Self {
+        let sizes = fit.sizes();
+        let mut directions = directions(&sizes, &fit.theta);
+        let course = Course::of(&sizes, &mut directions);
+        Self { theta: fit.theta, directions, course }
+    }
+}
+
+impl Gram {
+    /// The same over the columns `keep`, with random effects taken out: columns that every drive has
+    /// for itself and columns that all share, each with its standard deviation.
+    fn marginal(
+        &self,
+        keep: &[usize],
+        between: &[(usize, f64)],
+        along: &[(usize, f64)],
+    ) -> Option<Self> {
+        let (u, w) = (between.len(), along.len());
+        let n = self.per_drive.first()?.nrows();
+        let q = self.own.first().map_or(0, DMatrix::nrows);
+        let mut out = Self {
+            per_drive: Vec::new(),
+            common: Vec::new(),
+            own: std::sync::Arc::default(),
+            log_det: 0.0,
+        };
+        let (mut owns, mut all, mut before) =
+            (Vec::new(), DMatrix::identity(q + w, q + w), DMatrix::identity(q, q));
+        for (i, g) in self.per_drive.iter().enumerate() {
+            let empty = DMatrix::zeros(0, n);
+            let (c, own) = match (self.common.get(i), self.own.get(i)) {
+                (Some(c), Some(own)) => (c, own.clone()),
+                _ => (&empty, DMatrix::zeros(0, 0)),
+            };
+            before += &own;
+            let columns = |x: &DMatrix<f64>, of: &[(usize, f64)]| {
+                DMatrix::from_fn(x.nrows(), of.len(), |r, j| x[(r, of[j].0)] * of[j].1)
+            };
+            let (gu, cu) = (columns(g, between), columns(c, between));
+            let inner = DMatrix::from_fn(u, u, |a, b| {
+                between[a].1 * gu[(between[a].0, b)] + if a == b { 1.0 } else { 0.0 }
+            });
+            let factor = inner.cholesky()?;
+            out.log_det += 2.0 * factor.l().diagonal().iter().map(|x| x.ln()).sum::<f64>();
+            let g = g - &gu * factor.solve(&gu.transpose());
+            let c = c - &cu * factor.solve(&gu.transpose());
+            let own = own - &cu * factor.solve(&cu.transpose());
+            let (gw, cw) = (columns(&g, along), columns(&c, along));
+            let common = DMatrix::from_fn(q + w, keep.len(), |r, j| {
+                if r < q { c[(r, keep[j])] } else { gw[(keep[j], r - q)] }
+            });
+            let mut wide = DMatrix::zeros(q + w, q + w);
+            wide.view_mut((0, 0), (q, q)).copy_from(&own);
+            wide.view_mut((0, q), (q, w)).copy_from(&cw);
+            wide.view_mut((q, 0), (w, q)).copy_from(&cw.transpose());
+            let ww = DMatrix::from_fn(w, w, |a, b| along[a].1 * gw[(along[a].0, b)]);
+            wide.view_mut((q, q), (w, w)).copy_from(&ww);
+            all += &wide;
+            owns.push(wide);
+            out.common.push(common);
+            out.per_drive.push(crate::problem::stats::evidence::sub(&g, keep));
+        }
+        let log_det = |m: DMatrix<f64>| -> Option<f64> {
+            Some(2.0 * m.cholesky()?.l().diagonal().iter().map(|x| x.ln()).sum::<f64>())
+        };
+        out.log_det += log_det(all)? - log_det(before)?;
+        out.own = std::sync::Arc::new(owns);
+        Some(out)
+    }
+
+    /// Information and gradient over all drives, and what the residual costs: its squared length and
+    /// the logarithm of the determinant of the random effects.
+    pub(crate) fn total(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let (a, b, norm) = self.sum(|_| true);
+        (a, b, norm + self.log_det)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Weather scatters by its whole length to every side, a truck's cause by its size.
+    #[test]
+    fn a_wind_scatters_to_all_sides() {
+        let zero = [0.0; crate::causes::param::PARAMS];
+        let mut theta = zero;
+        theta[P::WindX as usize] = 3.0;
+        theta[P::WindY as usize] = -4.0;
+        theta[P::Mass as usize] = 0.1;
+        let sizes = [P::WindX, P::WindY, P::Mass];
+        let mut directions = directions(&sizes, &theta);
+        let course = Course::of(&sizes, &mut directions);
+        let sigma = course.deviations(directions.len(), &theta, &zero);
+        assert_eq!(sigma[..2], [WEATHER * 5.0; 2]);
+        assert_eq!(sigma[2], TAU * 0.1);
+        let hats = &sigma[3..3 + 2 * OF_WEATHER];
+        assert!(hats.iter().all(|x| *x == WEATHER * 5.0), "{hats:?}");
+    }
+
+    /// The truck model's catalogue says who gives a cause's law; the courses follow it, but for the
+    /// signals over which a form is fitted.
+    #[test]
+    fn a_course_is_as_wide_as_the_catalogue_says_of_its_causes_law() {
+        let (mut broad, mut fitted) = (0, 0);
+        for h in CATALOGUE {
+            let law = h.of_truck().unwrap().law;
+            let along: Vec<f64> = h.sizes.iter().flat_map(|p| signals(*p)).map(|s| s.1).collect();
+            match law {
+                Law::Physics if weather(h) => assert_eq!(along[0], WEATHER, "{}", h.id),
+                Law::Physics => assert!(along.iter().all(|rho| *rho == RHO), "{}", h.id),
+                Law::Chosen => assert!(along.contains(&RHO_SHAPE), "{}", h.id),
+            }
+            broad += usize::from(law == Law::Chosen);
+            for along in h.course {
+                assert!(signal(along.signal()).is_some(), "{}: {}", h.id, along.signal());
+                fitted += usize::from(matches!(along, Along::Fitted(_)));
+                // what is fitted needs a form
+                assert!(!matches!(along, Along::Fitted(_)) || !h.shapes.is_empty(), "{}", h.id);
+            }
+        }
+        assert!(broad >= 15 && fitted >= 5, "{broad} {fitted}");
+    }
+}

@@ -1,0 +1,109 @@
+//! Evidence of a few given matrices: residuals that fall linearly with the sizes of causes.
+
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use super::Evidence;
+use crate::causes::hypothesis::CATALOGUE;
+use crate::causes::param::{P, PARAMS, Theta};
+use crate::problem::{Direction, Gram, Hat};
+
+/// One drive: whitened rows, what each parameter does to them, and the tolerances.
+pub(crate) struct LinearDrive {
+    /// Residual without any cause.
+    pub(crate) residual: Vec<f64>,
+    /// Rows of a size of one, per parameter.
+    pub(crate) columns: Vec<(P, Vec<f64>)>,
+    /// Rows of one standard deviation of each tolerance.
+    pub(crate) tolerances: Vec<Vec<f64>>,
+}
+
+/// Drives given as matrices.
+pub(crate) struct LinearProblem {
+    pub(crate) drives: Vec<LinearDrive>,
+    /// Over-dispersion of drives in order about any cause.
+    pub(crate) scatter: f64,
+    zero: Theta,
+}
+
+impl LinearProblem {
+    pub(crate) fn new(drives: Vec<LinearDrive>) -> Self {
+        Self { drives, scatter: 1.0, zero: [0.0; PARAMS] }
+    }
+
+    /// Index of a cause.
+    pub(crate) fn cause(id: &str) -> usize {
+        CATALOGUE.iter().position(|h| h.id == id).unwrap()
+    }
+}
+
+impl LinearDrive {
+    fn column(&self, p: P) -> Vec<f64> {
+        let own = self.columns.iter().find(|c| c.0 == p);
+        own.map_or_else(|| vec![0.0; self.residual.len()], |c| c.1.clone())
+    }
+
+    /// Rows times a hat function of their place.
+    fn under(&self, rows: Vec<f64>, hat: Option<Hat>) -> Vec<f64> {
+        let Some(hat) = hat else { return rows };
+        let knots = hat.last as f64;
+        let place = |i: usize| i as f64 / (rows.len() - 1) as f64 * knots;
+        let weight = |i: usize| (1.0 - (place(i) - hat.knot as f64).abs()).max(0.0);
+        rows.iter().enumerate().map(|(i, x)| x * weight(i)).collect()
+    }
+
+    fn residual_at(&self, theta: &Theta) -> Vec<f64> {
+        let mut r = self.residual.clone();
+        for (p, column) in &self.columns {
+            r.iter_mut().zip(column).for_each(|(r, c)| *r -= theta[*p as usize] * c);
+        }
+        r
+    }
+
+    fn gram(&self, theta: &Theta, directions: &[Direction]) -> DMatrix<f64> {
+        let mut lines = vec![self.residual_at(theta)];
+        lines.extend(directions.iter().map(|d| self.under(self.column(d.p), d.hat)));
+        let of = |lines: &[Vec<f64>]| {
+            let rows = self.residual.len();
+            DMatrix::from_fn(rows, lines.len(), |i, j| lines[j][i])
+        };
+        let x = of(&lines);
+        let mut g = x.transpose() * &x;
+        if !self.tolerances.is_empty() {
+            let z = of(&self.tolerances);
+            let zx = z.transpose() * &x;
+            let q = self.tolerances.len();
+            let factor = (DMatrix::identity(q, q) + z.transpose() * &z).cholesky().unwrap();
+            g -= zx.transpose() * factor.solve(&zx);
+        }
+        g
+    }
+}
+
+impl Evidence for LinearProblem {
+    fn zero(&self) -> &Theta {
+        &self.zero
+    }
+
+    fn drives(&self) -> usize {
+        self.drives.len()
+    }
+
+    fn scatter_of(&self, _: usize) -> f64 {
+        self.scatter
+    }
+
+    fn gram_along(&self, theta: &Theta, _: &Theta, directions: &[Direction]) -> Gram {
+        Gram::without_common(self.drives.iter().map(|d| d.gram(theta, directions)).collect())
+    }
+}
+
+impl Gram {
+    /// Gram matrices of drives whose tolerances' means are known.
+    fn without_common(per_drive: Vec<DMatrix<f64>>) -> Self {
+        Self { per_drive, common: Vec::new(), own: Arc::default(), log_det: 0.0 }
+    }
+}
+
+mod tests;
