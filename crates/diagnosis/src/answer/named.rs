@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::causes::hypothesis::CATALOGUE;
+use crate::causes::param::P;
 use crate::causes::sentence;
 use crate::outside::sure::{beyond, shows};
 use crate::outside::unknown::{Acts, Shape};
@@ -158,14 +159,18 @@ pub(crate) fn causes(
         }
         let size = hyp.size(&fit.theta, zero);
         let sigma = {
-            let of = |p: &crate::causes::param::P| {
+            let of = |p: &P| {
                 let x = fit.theta[*p as usize] - zero[*p as usize];
                 parameters.get(p.spec().key).map_or(0.0, |q: &Parameter| x * q.sigma)
             };
             hyp.sizes.iter().map(of).map(|x| x * x).sum::<f64>().sqrt() / size.abs().max(1e-12)
         };
         let unit = hyp.sizes.first().map_or("", |p| p.spec().unit);
-        let sentence = sentence::with_interval(sentence::cause(hyp.id, size), size, sigma, unit);
+        let mut sentence =
+            sentence::with_interval(sentence::cause(hyp.id, size), size, sigma, unit);
+        if let Some(mesh) = parameters.get(P::MeshLoss.spec().key) {
+            sentence.push_str(&sentence::where_lost((size, sigma), (mesh.value, mesh.sigma)));
+        }
         let cause = Cause {
             id: hyp.id,
             kind: hyp.kind(),
