@@ -104,13 +104,12 @@ pub fn diagnose_with(
     let (open, not_observable, detectable) = observable(&problem, options);
     let bare = beyond(&problem, &Point::bare(problem.reference.theta));
     let most = bare.first().map_or(0.0, |s| s.log_z);
-    let fitted = problem.evidence().search(&open, options.max_causes, most, &mut |found| {
+    let kept = problem.evidence().kept(&open, options.max_causes, most, &mut |found| {
         progress(Progress::Search { found });
     });
-    let Some((empty, fit)) = fitted else {
+    let Some((empty, fit)) = kept else {
         return Err(DiagnosisError::Numerics("no evidence can be computed".into()));
     };
-    let fit = problem.evidence().gate(fit, &empty);
     progress(Progress::Unknown);
     let (fit, shape, mut sure) = judge(&problem, &empty, fit, &bare);
     let held = (!held.is_empty())

@@ -8,6 +8,7 @@
 //! | `refit` | a set fitted |
 //! | `steps` | add, swap, drop, pair |
 //! | `gate` | which are kept |
+//! | `kept` | search and gate in turns |
 //! | `held_out` | causes against unseen drives |
 //! | `worth` | what evidence is worth |
 //! | `weights` | how probable an explanation is |
@@ -18,6 +19,7 @@ pub(crate) mod evidence;
 pub(crate) mod free;
 pub(crate) mod gate;
 pub(crate) mod held_out;
+pub(crate) mod kept;
 pub(crate) mod refit;
 pub(crate) mod screen;
 pub(crate) mod steps;

@@ -141,7 +141,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     .along(&[Fitted("coolant_temp_degc"), Open("engine_speed_rpm")]),
     h("turbo_lag", &[P::TurboLag], &[P::TurboStart], ONE, PEDAL, 0.08, 0.0)
         .along(&[Open("engine_speed_rpm")]),
-    h("pedal_delay", &[P::PedalDelay], &[P::PedalLag], LATE_OR_SLOW, PEDAL, 0.03, 0.0)
+    h("pedal_delay", &[P::PedalDelay], &[P::PedalLag], ONE, PEDAL, 0.03, 0.0)
         .along(&[Open("engine_speed_rpm")]),
     h("shift_duration", &[P::ShiftTime], &[], ONE, &[C::ShiftInProcess], 0.08, 0.0)
         .along(&[Open("gear"), Open("engine_speed_rpm")]),
