@@ -143,9 +143,18 @@ fn elsewhere(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: &[Shape]) -> Fi
 /// The causes that do not show where something without a name wins, nor in what is replayed from what
 /// is measured there: it says nothing about them.
 fn apart(problem: &Problem<'_>, empty: &Fit, fit: &Fit, won: Module) -> Fit {
-    let in_doubt = |cause: usize| {
+    without(problem, empty, fit, |cause| {
         Module::ALL.into_iter().any(|m| (m == won || reads(m, won)) && shows(cause, m))
-    };
+    })
+}
+
+/// The causes that are not in doubt, as far as they stand alone.
+pub(crate) fn without(
+    problem: &Problem<'_>,
+    empty: &Fit,
+    fit: &Fit,
+    in_doubt: impl Fn(usize) -> bool,
+) -> Fit {
     let mut left = fit.clone();
     let mut i = 0;
     while i < left.set.len() {

@@ -1,11 +1,12 @@
 //! The diagnosis as a whole: drives in, [`Diagnosis`] out.
 
 use crate::answer::gain::{DriveError, gain};
-use crate::answer::named::{Answer, Named, causes};
+use crate::answer::named::{Named, causes};
 use crate::answer::observable::observable;
 use crate::answer::wrong::wrong;
+use crate::causes::hypothesis::CATALOGUE;
 use crate::causes::sentence;
-use crate::outside::sure::{Sure, beyond, describe, judge};
+use crate::outside::sure::{Sure, beyond, describe, judge, without};
 use crate::outside::unknown::Shape;
 use crate::problem::Problem;
 use crate::problem::baseline::Baseline;
@@ -14,6 +15,7 @@ use crate::replay::{Module, Prepared};
 use crate::run::drive_use::{DriveRole, drive_uses};
 use crate::run::report_models::Models;
 use crate::search::decisions::{EXPLAINED, MIN_EVIDENCE};
+use crate::search::weights::outweighed;
 use crate::{
     Action, Diagnosis, DiagnosisError, DriveSet, Executor, Finding, FindingKind, Plant, Verdict,
 };
@@ -125,15 +127,26 @@ pub fn diagnose_with(
         }
         None => fit,
     };
-    let Answer { mut causes, instead } = causes(&problem, &fit, &empty, &open, &bare);
+    let answer = causes(&problem, &fit, &empty, &open, &bare);
+    // What may be there in place of a cause is said as far as it makes the cause unsure.
+    let doubts = answer.instead.iter().filter(|(_, p)| *p > 1.0 - EXPLAINED);
+    let doubts: Vec<Shape> = doubts.map(|(s, _)| s.clone()).collect();
+    let functions = answer.instead.iter().map(|(_, p)| p).sum();
+    let stated: Vec<_> = answer.causes.iter().map(|c| (c.cause.id, c.cause.probability)).collect();
+    let outweighed = outweighed(&stated, functions);
+    let (fit, mut causes, shape) = if outweighed.is_empty() {
+        (fit, answer.causes, shape)
+    } else {
+        sure = Sure::Outside;
+        let fit = without(&problem, &empty, &fit, |h| outweighed.contains(&CATALOGUE[h].id));
+        let left = causes(&problem, &fit, &empty, &open, &bare).causes;
+        (fit, left, describe(&doubts).or(shape))
+    };
     let weak = |c: &Named| c.rivalled && c.cause.evidence < MIN_EVIDENCE;
     let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);
     let fit = if faint { empty } else { fit };
     causes.retain(|_| !faint);
-    // What may be there in place of a cause is said as far as it makes the cause unsure.
-    let likely: Vec<Shape> =
-        instead.into_iter().filter(|(_, p)| *p > 1.0 - EXPLAINED).map(|(s, _)| s).collect();
-    let shape = shape.or_else(|| if faint { None } else { describe(&likely) });
+    let shape = shape.or_else(|| if faint { None } else { describe(&doubts) });
     if sure == Sure::Not {
         causes.iter_mut().for_each(|c| c.cause.sentence.push_str(sentence::NOT_SURE));
     }

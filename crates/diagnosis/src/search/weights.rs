@@ -94,9 +94,26 @@ pub(crate) fn of_functions(models: &[Weighed], weights: &[f64], functions: usize
     sums.into_iter().map(|sum: f64| sum.clamp(0.0, 1.0)).collect()
 }
 
+/// Which causes functions in their place outweigh: a function is there more probably than not
+/// (`functions`, the sum of their weights), and the cause less so.
+pub(crate) fn outweighed<'a>(causes: &[(&'a str, f64)], functions: f64) -> Vec<&'a str> {
+    let open = causes.iter().filter(|c| log_odds(functions) > 0.0 && log_odds(c.1) < 0.0);
+    open.map(|c| c.0).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An engine brake that holds less in thin air was called 10 % less engine brake, with a probability
+    /// of 0.10 against functions of the altitude.
+    #[test]
+    fn a_cause_that_functions_outweigh_is_not_named_and_one_that_a_cause_outweighs_stays() {
+        assert_eq!(outweighed(&[("engine_brake_torque", 0.1)], 0.9), ["engine_brake_torque"]);
+        assert_eq!(outweighed(&[("mass", 0.99), ("engine_brake_torque", 0.2)], 0.75).len(), 1);
+        assert!(outweighed(&[("air_drag", 0.3)], 0.01).is_empty());
+        assert!(outweighed(&[("air_drag", 0.6)], 0.4).is_empty());
+    }
 
     fn model(causes: &[&'static str], log_z: f64) -> Weighed {
         Weighed { causes: causes.to_vec(), function: None, log_z }
