@@ -198,8 +198,8 @@ fn sharing(fit: &Fit, module: Module) -> usize {
 }
 
 /// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
-/// module, a module that they explain keeps more variance than drives in order have, or a figure
-/// has run to its bound.
+/// module, a module that they explain keeps more variance than drives in order have, or a size
+/// or a form has run to its bound.
 fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
     let now = problem.settled(&Point::of(fit));
     let strained = Module::ALL.into_iter().any(|m| {
@@ -208,7 +208,10 @@ fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
         share >= CROWD || (share > 0 && excess > MISFIT)
     });
     let zero = &problem.reference.theta;
-    strained || fit.set.iter().any(|h| CATALOGUE[*h].is_at_bound(&fit.theta, zero))
+    let ends = |h: &usize| {
+        CATALOGUE[*h].is_at_bound(&fit.theta, zero) || CATALOGUE[*h].strays(&fit.theta, zero)
+    };
+    strained || fit.set.iter().any(ends)
 }
 
 /// What the best of some free functions says, with the signals that say nearly as much.

@@ -91,11 +91,13 @@ impl Hypothesis {
 
     /// One of its sizes has run to a bound: the fit would go on.
     pub(crate) fn is_at_bound(&self, t: &Theta, zero: &Theta) -> bool {
-        self.sizes.iter().any(|p| {
-            let (s, x) = (p.spec(), t[*p as usize] - zero[*p as usize]);
-            let near = BOUND * (s.hi - s.lo);
-            x <= s.lo + near && s.lo < 0.0 || x >= s.hi - near
-        })
+        self.sizes.iter().any(|p| at_bound(*p, t, zero))
+    }
+
+    /// Its form has run to the end of what a truck may have: something else is drawn with it. A form that
+    /// begins at nothing (a lag, a width) may be there.
+    pub(crate) fn strays(&self, t: &Theta, zero: &Theta) -> bool {
+        self.shapes.iter().any(|p| p.spec().lo < 0.0 && at_bound(*p, t, zero))
     }
 
     /// Nonlinear enough that a linear screen may miss it.
@@ -104,9 +106,31 @@ impl Hypothesis {
     }
 }
 
+/// A parameter stands at a bound that is not nothing.
+fn at_bound(p: P, t: &Theta, zero: &Theta) -> bool {
+    let (s, x) = (p.spec(), t[p as usize] - zero[p as usize]);
+    let near = BOUND * (s.hi - s.lo);
+    x <= s.lo + near && s.lo < 0.0 || x >= s.hi - near
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::causes::param::PARAMS;
+
+    /// A steering offset beside soft drive tyres was a crosswind of 8.9 m/s that pushes the trailer 4 m
+    /// behind its CG, `explained`.
+    #[test]
+    fn a_form_at_the_end_of_what_a_truck_may_have_strays_and_one_that_is_not_there_does_not() {
+        let of = |id: &str| CATALOGUE.iter().find(|h| h.id == id).unwrap();
+        let zero = [0.0; PARAMS];
+        let mut t = zero;
+        t[P::Crosswind as usize] = 8.9;
+        assert!(!of("crosswind").strays(&t, &zero));
+        t[P::CrosswindBehind as usize] = P::CrosswindBehind.spec().hi;
+        assert!(of("crosswind").strays(&t, &zero) && !of("crosswind").is_at_bound(&t, &zero));
+        assert!(!of("brake_fade").strays(&zero, &zero), "linings without a lag");
+    }
 
     #[test]
     fn the_catalogue_is_that_of_the_truck_model() {
