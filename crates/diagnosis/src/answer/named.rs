@@ -169,7 +169,7 @@ pub(crate) fn causes(
         let mut sentence =
             sentence::with_interval(sentence::cause(hyp.id, size), size, sigma, unit);
         if let Some(mesh) = parameters.get(P::MeshLoss.spec().key) {
-            sentence.push_str(&sentence::where_lost((size, sigma), (mesh.value, mesh.sigma)));
+            sentence.push_str(&sentence::where_lost(size, (mesh.value, mesh.sigma)));
         }
         let cause = Cause {
             id: hyp.id,
