@@ -11,7 +11,7 @@ use crate::Plant;
 const LEAST_M_S: f64 = 1.0;
 
 /// A measured ratio this close to 1 is that of a direct gear: gears are 1.2 to 1.3 apart.
-const DIRECT_WITHIN: f64 = 0.1;
+const MEASURED_DIRECT_WITHIN: f64 = 0.1;
 
 /// Samples that are computed side by side.
 pub(super) const BLOCK: usize = 64;
@@ -72,7 +72,9 @@ impl Inputs {
         let direct: Vec<bool> =
             (0..=driveline.top_gear()).map(|g| driveline.is_direct(g)).collect();
         let passes_through = |i: usize| match d.measured_ratio {
-            true => (measured(i).0 / driveline.shaft_force_n(1.0) - 1.0).abs() < DIRECT_WITHIN,
+            true => {
+                (measured(i).0 / driveline.shaft_force_n(1.0) - 1.0).abs() < MEASURED_DIRECT_WITHIN
+            }
             false => direct.get(d.gear[i]).copied().unwrap_or(false),
         };
         let holding = induced_n(d, plant);

@@ -140,7 +140,9 @@ pub fn diagnose_with(
         sure = Sure::Outside;
         let fit = without(&problem, &empty, &fit, |h| outweighed.contains(&CATALOGUE[h].id));
         let left = causes(&problem, &fit, &empty, &open, &bare).causes;
-        (fit, left, describe(&doubts).or(shape))
+        // What was found before may be about something else, and larger.
+        let said = [describe(&doubts), shape].into_iter().flatten();
+        (fit, left, said.max_by(|a, b| a.evidence.total_cmp(&b.evidence)))
     };
     let weak = |c: &Named| c.rivalled && c.cause.evidence < MIN_EVIDENCE;
     let faint = shape.is_none() && causes.len() == 1 && causes.iter().all(weak);
