@@ -131,7 +131,8 @@ def test_a_minute_of_training_beats_keep_and_random_changes(tmp_path: Path) -> N
         rounds=10,
         episode_s=200.0,
         warm_up=1000,
-        validation_seeds=6,
+        validate_every=1,
+        validation_seeds=12,
     )
     Training(settings, tmp_path).run()
     policy = tractrix.Policy(tmp_path / "policy.safetensors")

@@ -29,6 +29,7 @@ import torch
 from tractrix import VectorEnv
 from tractrix.evaluate.drive import TABLE2, drive
 from tractrix.train._command import command
+from tractrix.train.device import device_of
 from tractrix.train.export import export
 from tractrix.train.network import QNetwork
 
@@ -75,6 +76,8 @@ class Settings:
     """Rounds between two validations."""
     validation_seeds: int = 4
     """Episodes of each scenario in a validation."""
+    device: str = "cpu"
+    """PyTorch's device that the network is fitted on. Another device rounds otherwise."""
 
 
 class Replay:
@@ -146,8 +149,10 @@ class Learner:
     """Network, target and optimiser."""
 
     def __init__(self, size: int, settings: Settings) -> None:
+        self.device = device_of(settings.device)
         torch.manual_seed(settings.seed)
-        self.online, self.target = QNetwork(size), QNetwork(size)
+        self.online = QNetwork(size).to(self.device)
+        self.target = QNetwork(size).to(self.device)
         self.target.load_state_dict(self.online.state_dict())
         self.optimiser = torch.optim.Adam(
             self.online.parameters(), settings.learning_rate
@@ -163,7 +168,7 @@ class Learner:
     def act(self, obs: Array, mask: Array) -> Array:
         """The best allowed actions."""
         with torch.no_grad():
-            values = self.online(torch.from_numpy(obs)).numpy()
+            values = self.online(torch.from_numpy(obs).to(self.device)).cpu().numpy()
         best: Array = np.where(mask, values, -np.inf).argmax(axis=1)
         return best
 
@@ -173,6 +178,7 @@ class Learner:
         share = lowest + (1 - lowest) * 0.5 * (1 + np.cos(np.pi * progress_frac))
         for group in self.optimiser.param_groups:
             group["lr"] = self.settings.learning_rate * float(share)
+        rows = {name: values.to(self.device) for name, values in rows.items()}
         with torch.no_grad():
             # Double: the network chooses, its target says what the choice is worth.
             ahead = self.online(rows["next_obs"])
@@ -211,8 +217,6 @@ class Training:
         resume: bool = False,
         tensorboard: bool = False,
     ) -> None:
-        torch.set_num_threads(1)
-        torch.use_deterministic_algorithms(True)
         self.settings, self.out, self.threads = settings, out, threads
         self.env = VectorEnv(
             settings.envs,
@@ -366,7 +370,9 @@ class Training:
         (self.out / "checkpoint.new").replace(self.out / "checkpoint.pt")
 
     def _load(self) -> None:
-        state = torch.load(self.out / "checkpoint.pt", weights_only=True)
+        state = torch.load(
+            self.out / "checkpoint.pt", map_location="cpu", weights_only=True
+        )
         if state["settings"] != dataclasses.asdict(self.settings):
             raise ValueError(f"{self.out}: the checkpoint was trained otherwise")
         self.learner.online.load_state_dict(state["online"])

@@ -15,6 +15,7 @@ number of environment threads, and of actors on a Ray cluster (`asking`).
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import json
 import sys
@@ -30,6 +31,7 @@ from tractrix import _native
 from tractrix.evaluate.drive import TABLE2, drive
 from tractrix.train._command import command
 from tractrix.train.asking import Asking, Draws, Team
+from tractrix.train.device import device_of
 from tractrix.train.export import encoded, export
 from tractrix.train.margin import with_margins
 from tractrix.train.network import QNetwork
@@ -52,7 +54,7 @@ class Settings:
     first_base: str = "mobil"
     """Who decides in the first round, in the rollouts and on the road: `mobil` and the like, or `dqn`,
     `dqn:FILE` to go on from a policy."""
-    envs: int = 96
+    envs: int = 288
     """Environments."""
     episode_s: float = 300.0
     """Length of an episode, s."""
@@ -82,8 +84,13 @@ class Settings:
     """Advantages are cut here, s: how bad the worst change is does not matter."""
     validate_every: int = 10
     """Epochs between two validations."""
-    validation_seeds: int = 8
+    validation_seeds: int = 16
     """Episodes of each scenario in a validation."""
+    average_frac: float = 0.999
+    """What an update leaves of the running mean of the weights, which is what decides and goes on;
+    0: the weights themselves."""
+    device: str = "cpu"
+    """PyTorch's device that the network is fitted on. Another device rounds otherwise."""
 
 
 class Training:
@@ -108,8 +115,7 @@ class Training:
         resume: bool = False,
         tensorboard: bool = False,
     ) -> None:
-        torch.set_num_threads(1)
-        torch.use_deterministic_algorithms(True)
+        self.device = device_of(settings.device)
         torch.manual_seed(settings.seed)
         self.settings, self.out, self.threads = settings, out, threads
         given = dataclasses.asdict(settings)
@@ -117,7 +123,7 @@ class Training:
         asking = Asking(**{name: given[name] for name in names})
         self.team = Team(asking, settings.envs, actors, threads)
         size = _native.observation_size("ours")
-        self.network = QNetwork(size)
+        self.network = QNetwork(size).to(self.device)
         self.obs = np.zeros((0, size), np.float32)
         self.worth = np.zeros((0, 3), np.float32)
         self.scenario = np.zeros(0, np.int64)
@@ -145,7 +151,7 @@ class Training:
 
     @property
     def policy(self) -> QNetwork:
-        """The network with its margin, as it decides."""
+        """The network with its margin, as it decides: on the CPU."""
         return with_margins(self.network, company_s=self.settings.company_s)
 
     def act(self, obs: Array, mask: Array) -> Array:
@@ -173,30 +179,42 @@ class Training:
         settings, count = self.settings, len(self.obs)
         share = np.bincount(self.scenario, minlength=len(settings.scenarios)) / count
         weight = 1.0 / (share[self.scenario] * np.count_nonzero(share))
-        obs, known = torch.from_numpy(self.obs), torch.from_numpy(~np.isnan(self.worth))
-        wanted = torch.from_numpy(
-            np.nan_to_num(self.worth).clip(-settings.most_s, settings.most_s)
-        )
-        weights = torch.from_numpy(weight.astype(np.float32))[:, None] * known
-        adam = torch.optim.Adam(self.network.parameters(), settings.learning_rate)
+        worth = np.nan_to_num(self.worth).clip(-settings.most_s, settings.most_s)
+        obs, wanted = self._there(self.obs), self._there(worth)
+        known = self._there(~np.isnan(self.worth))
+        weights = self._there(weight.astype(np.float32))[:, None] * known
+        fitted = copy.deepcopy(self.network)
+        adam = torch.optim.Adam(fitted.parameters(), settings.learning_rate)
         updates = settings.epochs * -(-count // settings.batch)
         done = 0
         for epoch in range(1, settings.epochs + 1):
-            loss_sum = 0.0
-            for at in torch.from_numpy(rng.permutation(count)).split(settings.batch):
+            loss_sum = torch.zeros((), dtype=torch.float64, device=self.device)
+            for at in self._there(rng.permutation(count)).split(settings.batch):
                 falls = 0.05 + 0.95 * 0.5 * (1.0 + np.cos(np.pi * done / updates))
                 adam.param_groups[0]["lr"] = settings.learning_rate * float(falls)
                 loss = torch.nn.functional.smooth_l1_loss(
-                    self.network(obs[at]), wanted[at], reduction="none"
+                    fitted(obs[at]), wanted[at], reduction="none"
                 )
                 loss = (loss * weights[at]).sum() / weights[at].sum()
                 adam.zero_grad()
                 loss.backward()
                 adam.step()
                 done += 1
-                loss_sum += float(loss.detach()) * len(at)
+                self._follow(fitted, done)
+                loss_sum += loss.detach() * len(at)
             if epoch % settings.validate_every == 0 or epoch == settings.epochs:
-                self._tell(epoch, loss_sum / count, self._validate())
+                self._tell(epoch, float(loss_sum) / count, self._validate())
+
+    def _there(self, values: Array) -> torch.Tensor:
+        return torch.from_numpy(values).to(self.device)
+
+    def _follow(self, fitted: QNetwork, updates: int) -> None:
+        """Lets the weights that decide follow those that are fitted, the first ones closely."""
+        kept = min(self.settings.average_frac, updates / (updates + 9.0))
+        with torch.no_grad():
+            pairs = zip(self.network.parameters(), fitted.parameters(), strict=True)
+            for mean, value in pairs:
+                mean.lerp_(value, 1.0 - kept)
 
     def _validate(self) -> dict[str, float]:
         """Drives without exploration; the best so far is exported."""
@@ -261,7 +279,9 @@ class Training:
         (self.out / "checkpoint.new").replace(self.out / "checkpoint.pt")
 
     def _load(self) -> None:
-        state = torch.load(self.out / "checkpoint.pt", weights_only=True)
+        state = torch.load(
+            self.out / "checkpoint.pt", map_location="cpu", weights_only=True
+        )
         of = dataclasses.asdict(self.settings)
         if state["settings"] | {"rounds": of["rounds"]} != of:
             raise ValueError(f"{self.out}: the checkpoint was trained otherwise")

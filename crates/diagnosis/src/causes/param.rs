@@ -2,6 +2,8 @@
 //! instruments. One vector serves as fitted causes (common to all drives), as tolerances (random,
 //! per drive) and as calibration (common, small, learned from drives that are in order).
 
+use super::hypothesis::CATALOGUE;
+
 /// Values of all parameters; zero is the truck file.
 pub(crate) type Theta = [f64; PARAMS];
 
@@ -254,40 +256,10 @@ impl Spec {
         if self.tolerance > 0.0 || has_none { self.tolerance } else { 0.02 * self.prior }
     }
 
+    /// A form of a cause, not a size; so is where the side force acts on a truck in order.
     fn is_shape(&self) -> bool {
-        matches!(
-            self.p,
-            P::WarmupTau
-                | P::FanStart
-                | P::FanWidth
-                | P::AltitudeStart
-                | P::HeatAirStart
-                | P::HeatCoolantStart
-                | P::HeatCoolantLag
-                | P::FuelLowLoad
-                | P::FuelLowOver
-                | P::RetarderFrom
-                | P::RetarderSaturation
-                | P::PlayCentring
-                | P::RetarderSteep
-                | P::FadeStart
-                | P::LiningLag
-                | P::PayloadSpread
-                | P::StiffnessFollows
-                | P::StiffnessFollowsMass
-                | P::TurboStart
-                | P::SteerDelay
-                | P::MeshLoss
-                | P::PedalLag
-                | P::WindShare
-                | P::CrosswindShare
-                | P::WindBehind
-                | P::CrosswindBehind
-                | P::SideShare
-                | P::SideBehind
-                | P::FuelFlowPower
-                | P::Co2Power
-        )
+        let of_cause = CATALOGUE.iter().any(|h| h.shapes.contains(&self.p));
+        of_cause || matches!(self.p, P::SideShare | P::SideBehind)
     }
 }
 

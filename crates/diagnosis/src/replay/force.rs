@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use dynamics::effects::brake::{BrakeParameters, friction_left_frac};
-use dynamics::effects::driveline::{from_speed_frac, with_losses_n};
+use dynamics::effects::driveline::{from_speed_frac, with_losses_n, with_mesh_loss};
 use dynamics::effects::resistance::{area_at_yaw_m2, cold_factor, drag_n, grade_n, rolling_n};
 use tractrix_core::ZERO_DEGC_K;
 
@@ -160,7 +160,7 @@ impl<'a> Longitudinal<'a> {
         }
         let meshes = cut::<L>(&d.meshes, at);
         let mut force: [f64; L] = lanes(|j| {
-            let efficiency = self.efficiency * (1.0 - self.mesh_loss * meshes[j]);
+            let efficiency = with_mesh_loss(self.efficiency, self.mesh_loss, meshes[j]);
             with_losses_n(net[j] * ratio[j], efficiency)
         });
         let air = self.air(at, v);

@@ -97,6 +97,13 @@ pub fn with_losses_n(loss_free_n: f64, efficiency_frac: f64) -> f64 {
     if loss_free_n > 0.0 { loss_free_n * efficiency_frac } else { loss_free_n / efficiency_frac }
 }
 
+/// Efficiency of a gear whose teeth carry the share `in_mesh` of the power (direct: none, others: all).
+#[inline]
+#[must_use]
+pub fn with_mesh_loss(direct_efficiency_frac: f64, mesh_loss_frac: f64, in_mesh: f64) -> f64 {
+    direct_efficiency_frac * (1.0 - mesh_loss_frac * in_mesh)
+}
+
 impl DrivelineParameters {
     pub(crate) fn violations(&self) -> Vec<String> {
         let mut b = Bounds::of("driveline");
@@ -137,8 +144,9 @@ impl DrivelineParameters {
     /// Efficiency engine to wheel in a gear (1-based).
     #[must_use]
     pub fn efficiency_frac(&self, gear: u8) -> f64 {
-        let mesh = if self.is_direct(gear) { 1.0 } else { 1.0 - self.mesh_loss_frac };
-        (self.direct_efficiency_frac() * mesh).clamp(0.05, 1.0)
+        let in_mesh = f64::from(u8::from(!self.is_direct(gear)));
+        let direct = self.direct_efficiency_frac();
+        with_mesh_loss(direct, self.mesh_loss_frac, in_mesh).clamp(0.05, 1.0)
     }
 
     /// Efficiency engine to wheel without what gears lose whose teeth carry the power.
