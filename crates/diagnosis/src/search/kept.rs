@@ -21,14 +21,15 @@ impl dyn Evidence + '_ {
         let mut open = open.to_vec();
         let (empty, mut found) = self.search(&open, max_causes, bare, progress)?;
         let mut best = empty.clone();
-        for _ in 0..=max_causes {
+        for turns_left in (0..=max_causes).rev() {
             let kept = self.gate(found.clone(), &empty);
             let taken = found.log_z - kept.log_z;
             open.retain(|h| !found.set.contains(h) || kept.set.contains(h));
             if kept.log_z > best.log_z {
                 best = kept;
             }
-            if taken < UNKNOWN_EVIDENCE || bare > AHEAD * found.log_z {
+            let little = taken < UNKNOWN_EVIDENCE || bare > AHEAD * found.log_z;
+            if little || turns_left == 0 {
                 break;
             }
             found = self.search(&open, max_causes, bare, progress)?.1;
