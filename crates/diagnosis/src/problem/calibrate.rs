@@ -6,7 +6,7 @@ use super::nuisance::Changed;
 use super::{Direction, Problem, Reference, nuisance_directions, replay};
 use crate::DiagnosisError;
 use crate::causes::hypothesis::CATALOGUE;
-use crate::causes::param::{P, PARAMS, SPECS, Theta};
+use crate::causes::param::{P, PARAMS, SPECS, Spec, Theta};
 use crate::problem::stats::whiten::Whitener;
 use crate::replay::{MODULES, Module, Prepared, Residuals};
 use crate::search::decisions::{FREE_FORM_NATS, MEAN_PRIOR, SCATTER_PRIOR};
@@ -92,9 +92,10 @@ impl Problem<'_> {
     /// Mean and scatter of every tolerance between the drives by expectation-maximisation, with
     /// [`SCATTER_PRIOR`] drives' worth of the scatter that is expected and a prior for the mean. The
     /// mean is what this truck and its weather are like when all is well (a crosswind of any sign
-    /// adds drag): causes count from there.
-    pub(super) fn scatter(&mut self) {
-        let specs: Vec<&crate::causes::param::Spec> =
+    /// adds drag): causes count from there. `moved` is how far means have been moved before; the prior
+    /// stands where they began. Returns how well the means are known, in the scatter between drives.
+    pub(super) fn scatter(&mut self, moved: &mut Theta) -> Theta {
+        let specs: Vec<&Spec> =
             nuisance_directions(&self.reference.tolerance).iter().map(|d| d.p.spec()).collect();
         let systems: Vec<(DMatrix<f64>, DVector<f64>)> = (0..self.drives.len())
             .map(|i| {
@@ -103,10 +104,14 @@ impl Problem<'_> {
             })
             .collect();
         let count = self.drives.len() as f64;
+        let mut spreads = [count.sqrt().recip(); PARAMS];
         // Means and variances in units of what the columns are scaled with.
         let mut variance = vec![1.0; specs.len()];
         let mut mean = DVector::<f64>::zeros(specs.len());
+        let mut known = vec![0.0; specs.len()];
+        let unit = |s: &Spec| self.reference.tolerance[s.p as usize];
         for _ in 0..SCATTER_ROUNDS {
+            known.fill(0.0);
             let mut first = DVector::<f64>::zeros(specs.len());
             let mut second = vec![0.0; specs.len()];
             for (a, b) in &systems {
@@ -115,23 +120,27 @@ impl Problem<'_> {
                     a[(j, j)] += 1.0 / v;
                     b[j] += mean[j] / v;
                 }
-                let Some(factor) = a.cholesky() else { return };
+                let Some(factor) = a.cholesky() else { return spreads };
                 let (z, spread) = (factor.solve(&b), factor.inverse());
-                for (j, s) in second.iter_mut().enumerate() {
-                    *s += (z[j] - mean[j]).powi(2) + spread[(j, j)];
+                for (j, v) in variance.iter().enumerate() {
+                    second[j] += (z[j] - mean[j]).powi(2) + spread[(j, j)];
+                    // Of the mean a drive tells what its own value says beyond its scatter about it.
+                    known[j] += (1.0 - spread[(j, j)] / v).max(0.0) / v;
                 }
                 first += z;
             }
             for (j, (v, s)) in variance.iter().zip(&specs).enumerate() {
-                let own = MEAN_PRIOR * s.scatter() / self.reference.tolerance[s.p as usize];
-                mean[j] = first[j] / (count + v / (own * own));
+                let prior = (MEAN_PRIOR * s.scatter() / unit(s)).powi(-2);
+                let before = moved[s.p as usize] / unit(s);
+                mean[j] = (first[j] - before * v * prior) / (count + v * prior);
+                known[j] += prior;
             }
             for ((v, second), s) in variance.iter_mut().zip(second).zip(&specs) {
                 if s.p == P::BrakeLoad {
                     // weighed anew on every trip, loads that no drive in order had among them
                     continue;
                 }
-                let expected = (s.scatter() / self.reference.tolerance[s.p as usize]).powi(2);
+                let expected = (s.scatter() / unit(s)).powi(2);
                 let bound = match s.p {
                     P::TurboLag | P::PedalDelay | P::TorqueReport => 2.0,
                     _ => 10.0,
@@ -142,11 +151,14 @@ impl Problem<'_> {
         }
         for (j, (v, s)) in variance.iter().zip(&specs).enumerate() {
             let i = s.p as usize;
-            let shift = mean[j] * self.reference.tolerance[i];
             let x = &mut self.reference.theta[i];
-            *x = (*x + shift).clamp(s.lo, s.hi);
+            let before = *x;
+            *x = (*x + mean[j] * self.reference.tolerance[i]).clamp(s.lo, s.hi);
+            moved[i] += *x - before;
             self.reference.tolerance[i] *= v.sqrt();
+            spreads[i] = (known[j] * v).sqrt().recip();
         }
+        spreads
     }
 
     /// Raw residuals of a drive after its tolerances are taken out.

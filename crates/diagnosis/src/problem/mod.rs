@@ -123,6 +123,7 @@ impl<'a> Problem<'a> {
         let residuals: Vec<Residuals> = drives.iter().map(|d| replay(d, plant, &theta)).collect();
         let reference = Reference::start(&drives, &residuals, theta, clean);
         let mut problem = Self::with(plant, drives, reference, executor)?;
+        let mut moved = [0.0; PARAMS];
         for round in 0..NOISE_ROUNDS {
             if clean {
                 problem.calibrate(round == 0)?;
@@ -131,15 +132,13 @@ impl<'a> Problem<'a> {
             }
             if clean && round > 0 {
                 problem.reference.attack_nats = problem.find_attack()?;
-                problem.scatter();
+                problem.scatter(&mut moved);
                 problem.rebuild(Changed::Scatter)?;
             }
             problem.learn_noise()?;
         }
         if clean {
-            problem.scatter();
-            // What the baseline calls the mean is known up to its own scatter.
-            problem.reference.mean_spread = [(1.0 / problem.drives.len() as f64).sqrt(); PARAMS];
+            problem.reference.mean_spread = problem.scatter(&mut moved);
             problem.rebuild(Changed::Scatter)?;
             problem.reference.scatter = problem.evidence().scatter_in_order();
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
