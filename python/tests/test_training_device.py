@@ -13,6 +13,7 @@ torch = pytest.importorskip(
 
 from tractrix.train import ddqn, rollout
 from tractrix.train.device import device_of
+from tractrix.train.network import QNetwork
 
 on_a_gpu = pytest.mark.skipif(
     not torch.cuda.is_available(), reason="PyTorch finds no GPU"
@@ -27,7 +28,7 @@ def test_a_device_that_is_not_here_is_refused_by_its_name(name: str) -> None:
 
 def test_a_mean_of_weights_follows_those_that_are_fitted(tmp_path: Path) -> None:
     training = fitted(tmp_path, average_frac=0.5)
-    mean, weights = training.network, rollout.QNetwork(training.obs.shape[1])
+    mean, weights = training.network, QNetwork(training.obs.shape[1])
     with torch.no_grad():
         for parameter in mean.parameters():
             parameter.zero_()

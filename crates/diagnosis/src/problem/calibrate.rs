@@ -93,7 +93,7 @@ impl Problem<'_> {
     /// [`SCATTER_PRIOR`] drives' worth of the scatter that is expected and a prior for the mean. The
     /// mean is what this truck and its weather are like when all is well (a crosswind of any sign
     /// adds drag): causes count from there. `moved` is how far means have been moved before; the prior
-    /// stands where they began. Returns how well the means are known, in the scatter between drives.
+    /// stands where they began. Returns the deviations of the means, in the scatter between drives.
     pub(super) fn scatter(&mut self, moved: &mut Theta) -> Theta {
         let specs: Vec<&Spec> =
             nuisance_directions(&self.reference.tolerance).iter().map(|d| d.p.spec()).collect();
@@ -108,10 +108,8 @@ impl Problem<'_> {
         // Means and variances in units of what the columns are scaled with.
         let mut variance = vec![1.0; specs.len()];
         let mut mean = DVector::<f64>::zeros(specs.len());
-        let mut known = vec![0.0; specs.len()];
         let unit = |s: &Spec| self.reference.tolerance[s.p as usize];
         for _ in 0..SCATTER_ROUNDS {
-            known.fill(0.0);
             let mut first = DVector::<f64>::zeros(specs.len());
             let mut second = vec![0.0; specs.len()];
             for (a, b) in &systems {
@@ -122,10 +120,8 @@ impl Problem<'_> {
                 }
                 let Some(factor) = a.cholesky() else { return spreads };
                 let (z, spread) = (factor.solve(&b), factor.inverse());
-                for (j, v) in variance.iter().enumerate() {
-                    second[j] += (z[j] - mean[j]).powi(2) + spread[(j, j)];
-                    // Of the mean a drive tells what its own value says beyond its scatter about it.
-                    known[j] += (1.0 - spread[(j, j)] / v).max(0.0) / v;
+                for (j, s) in second.iter_mut().enumerate() {
+                    *s += (z[j] - mean[j]).powi(2) + spread[(j, j)];
                 }
                 first += z;
             }
@@ -133,7 +129,7 @@ impl Problem<'_> {
                 let prior = (MEAN_PRIOR * s.scatter() / unit(s)).powi(-2);
                 let before = moved[s.p as usize] / unit(s);
                 mean[j] = (first[j] - before * v * prior) / (count + v * prior);
-                known[j] += prior;
+                spreads[s.p as usize] = (count + v * prior).sqrt().recip();
             }
             for ((v, second), s) in variance.iter_mut().zip(second).zip(&specs) {
                 if s.p == P::BrakeLoad {
@@ -156,7 +152,6 @@ impl Problem<'_> {
             *x = (*x + mean[j] * self.reference.tolerance[i]).clamp(s.lo, s.hi);
             moved[i] += *x - before;
             self.reference.tolerance[i] *= v.sqrt();
-            spreads[i] = (known[j] * v).sqrt().recip();
         }
         spreads
     }

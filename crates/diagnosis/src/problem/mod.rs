@@ -138,6 +138,7 @@ impl<'a> Problem<'a> {
             problem.learn_noise()?;
         }
         if clean {
+            // What the baseline calls the mean is known up to its own scatter.
             problem.reference.mean_spread = problem.scatter(&mut moved);
             problem.rebuild(Changed::Scatter)?;
             problem.reference.scatter = problem.evidence().scatter_in_order();

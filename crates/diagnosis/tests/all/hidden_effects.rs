@@ -140,7 +140,7 @@ fn an_unknown_in_the_fuel_leaves_the_causes_of_the_steering_named() {
 fn gusts_leave_the_causes_of_other_balances_named() {
     let gusts = Effect::Outside { kind: Outside::Gusts, size: 4000.0, shape: Shape([0.5; 4]) };
     let d = judge(&drives(&[gusts, cause("shift_duration", 0.4)], 43)).unwrap();
-    assert_eq!(d.verdict, Verdict::Unknown);
+    assert_eq!(d.verdict, Verdict::Unknown, "{:?} {:?}", d.causes, d.unknown);
     assert_eq!(named(&d), ["shift_duration"]);
     let extra = d.causes[0].parameters["extra_time_s"];
     assert!((extra.value - 0.4).abs() < 4.0 * extra.sigma, "{extra:?}");
