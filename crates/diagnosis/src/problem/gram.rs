@@ -5,9 +5,10 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::signals::Line;
-use super::{Direction, Problem, Rest};
+use super::{Direction, Problem, Rest, rows};
 use crate::causes::param::Theta;
 use crate::outside::unknown::KNOTS;
+use crate::problem::stats::slow::State;
 use crate::replay::Module;
 
 /// Marginal Gram matrix per drive over `[r, columns]`.
@@ -144,15 +145,7 @@ impl Problem<'_> {
             g -= y.transpose() * y;
         }
         factor.solve_mut(&mut zc);
-        (g, self.of_means(zc))
-    }
-
-    /// Products with the tolerances as products with the common effects.
-    fn of_means(&self, mut against: DMatrix<f64>) -> DMatrix<f64> {
-        for (mut row, spread) in against.row_iter_mut().zip(self.mean_spreads()) {
-            row *= spread;
-        }
-        against
+        (g, self.reference.means.tr_mul(&zc))
     }
 
     /// Marginal Gram matrix over the residual, hat functions of one module and the courses of the
@@ -176,8 +169,13 @@ impl Problem<'_> {
         let mut g = [[0.0; KNOTS]; KNOTS];
         let mut r = vec![[0.0; KNOTS]; own.len()];
         let mut z = vec![0.0; touched * KNOTS];
-        let rows = rest.whitened[m].len().min(places.len());
-        for k in 0..rows {
+        let count = rest.whitened[m].len().min(places.len());
+        // Sums over the blocks of slow noise.
+        let block = whitener.slow.as_ref().map_or(1, |s| s.block);
+        let weights = whitener.slow.as_ref().map(|_| whitener.weights(rows(&self.drives[i], m)));
+        let weights = weights.as_deref().unwrap_or_default();
+        let mut sums = vec![[0.0; KNOTS]; weights.len().div_ceil(block)];
+        for k in 0..count {
             let Some((left, sizes)) = places[k] else { continue };
             let row = &adjoint.rows[k * touched..(k + 1) * touched];
             for (at, w) in [(left, sizes[0]), (left + 1, sizes[1])] {
@@ -199,6 +197,21 @@ impl Problem<'_> {
             for a in low..=high {
                 for b in a..=high {
                     g[a][b] += hat[a] * hat[b];
+                }
+            }
+            if let Some((sums, w)) = sums.get_mut(k / block).zip(weights.get(k)) {
+                (low..=high).for_each(|a| sums[a] += w * hat[a]);
+            }
+        }
+        if let Some(slow) = &whitener.slow {
+            let mut states = [State::default(); KNOTS];
+            for (sums, gain) in sums.iter().zip(slow.gains(weights)) {
+                let e: [f64; KNOTS] =
+                    core::array::from_fn(|a| states[a].innovation(&gain, gain.mean(sums[a])));
+                for a in 0..KNOTS {
+                    for b in a..KNOTS {
+                        g[a][b] += gain.product((sums[a], e[a]), (sums[b], e[b]));
+                    }
                 }
             }
         }
@@ -232,6 +245,6 @@ impl Problem<'_> {
             out -= y.transpose() * y;
         }
         nuisance.factor.solve_mut(&mut against);
-        (out, self.of_means(against))
+        (out, self.reference.means.tr_mul(&against))
     }
 }

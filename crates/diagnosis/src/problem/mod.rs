@@ -19,9 +19,9 @@ pub(crate) use gram::Gram;
 pub(crate) use moved::moves;
 pub(crate) use nuisance::Rest;
 
-use calibrate::fit_whiteners;
 #[cfg(test)]
 pub(crate) use calibrate::resolution;
+use calibrate::{Noise, fit_whiteners, means_apart};
 use nuisance::{Changed, Nuisance};
 use signals::Kept;
 
@@ -31,8 +31,10 @@ use nalgebra::DMatrix;
 
 use crate::causes::param::{P, PARAMS, SPECS, Theta};
 use crate::problem::course::Point;
-use crate::problem::stats::whiten::Whitener;
-use crate::replay::{GROUPS, MODULES, Prepared, Residuals, replay_group};
+use crate::problem::stats::whiten::{Rows, Whitener};
+use crate::replay::{GROUPS, MODULES, Module, Prepared, Residuals, replay_group};
+use crate::search::decisions::MEAN_PRIOR;
+use crate::search::worth::Dispersion;
 use crate::{DiagnosisError, Executor, Plant, collect};
 
 /// Tolerances, calibration and noise of a truck and its logger.
@@ -42,8 +44,9 @@ pub(crate) struct Reference {
     pub(crate) theta: Theta,
     /// Scatter between drives, per parameter; 0 where none.
     pub(crate) tolerance: [f64; PARAMS],
-    /// Standard deviation of the tolerances' means, in the scatter between drives.
-    pub(crate) mean_spread: [f64; PARAMS],
+    /// Factor of the covariance of the tolerances' means, in the scatter between drives; rows in the
+    /// order of their columns.
+    pub(crate) means: DMatrix<f64>,
     pub(crate) whiteners: Vec<Whitener>,
     /// Mean square of whitened residuals at the calibration, tolerances included, per module.
     pub(crate) ratio: [f64; MODULES],
@@ -53,7 +56,7 @@ pub(crate) struct Reference {
     pub(crate) free_form: [f64; MODULES],
     /// How much more drives in order scatter about the sizes of every hypothesis than their information
     /// says; empty where no baseline has shown it.
-    pub(crate) scatter: Vec<f64>,
+    pub(crate) scatter: Vec<Dispersion>,
     /// What the baseline says for another point where side winds act than the truck file's, nats.
     pub(crate) attack_nats: f64,
 }
@@ -132,14 +135,14 @@ impl<'a> Problem<'a> {
             }
             if clean && round > 0 {
                 problem.reference.attack_nats = problem.find_attack()?;
-                problem.scatter(&mut moved);
+                problem.scatter(&mut moved)?;
                 problem.rebuild(Changed::Scatter)?;
             }
-            problem.learn_noise()?;
+            problem.learn_noise(if clean { Noise::Slow } else { Noise::Coloured })?;
         }
         if clean {
             // What the baseline calls the mean is known up to its own scatter.
-            problem.reference.mean_spread = problem.scatter(&mut moved);
+            problem.reference.means = problem.scatter(&mut moved)?;
             problem.rebuild(Changed::Scatter)?;
             problem.reference.scatter = problem.evidence().scatter_in_order();
             problem.reference.ratio = problem.ratios(&problem.reference.theta);
@@ -167,20 +170,21 @@ impl<'a> Problem<'a> {
         let mut reference = Reference::start(&drives, &residuals, theta, false);
         for p in figures {
             reference.tolerance[*p as usize] = p.spec().scatter();
-            reference.mean_spread[*p as usize] = 0.0;
         }
+        let spread = |p| if figures.contains(&p) { 0.0 } else { MEAN_PRIOR };
+        reference.means = means_apart(&reference.tolerance, spread);
         let mut problem = Self::with(plant, drives, reference, executor)?;
         for _ in 0..NOISE_ROUNDS {
             problem.recentre()?;
-            problem.learn_noise()?;
+            problem.learn_noise(Noise::Coloured)?;
         }
         Ok(problem)
     }
 
     /// Takes the noise from what the tolerances leave over.
-    fn learn_noise(&mut self) -> Result<(), DiagnosisError> {
+    fn learn_noise(&mut self, kind: Noise) -> Result<(), DiagnosisError> {
         let noise = self.each(|i| self.without_nuisance(i, &self.nuisance_mean(i)));
-        self.reference.whiteners = fit_whiteners(&self.drives, &noise, false);
+        self.reference.whiteners = fit_whiteners(&self.drives, &noise, kind);
         self.rebuild(Changed::Noise)
     }
 
@@ -238,6 +242,12 @@ pub(crate) fn replay(d: &Prepared, plant: &Plant, theta: &Theta) -> Residuals {
         replay_group(d, plant, theta, g, &mut out);
     }
     out
+}
+
+/// Rows of a module: what an engine reports of its torque is wrong by a part of it.
+fn rows(d: &Prepared, m: usize) -> Rows<'_> {
+    let carrier = (m == Module::Torque as usize).then_some(d.torque.as_slice());
+    Rows { ok: &d.valid[m], carrier }
 }
 
 /// Inner product with eight running sums, so that the compiler may use wide registers.

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::signals::Line;
-use super::{Problem, inner, nuisance_directions};
+use super::{Problem, inner, nuisance_directions, rows};
 use crate::DiagnosisError;
 use crate::problem::course::Point;
 use crate::replay::MODULES;
@@ -114,17 +114,10 @@ impl Problem<'_> {
 
     /// Information of a drive about the means of the tolerances, from its factor of `I + Z'Z`.
     pub(super) fn information(&self, factor: &Cholesky<f64, Dyn>) -> DMatrix<f64> {
-        let spread = self.mean_spreads();
         let inverse = factor.inverse();
         let q = inverse.nrows();
-        let own = DMatrix::identity(q, q) - inverse;
-        DMatrix::from_fn(q, q, |a, b| own[(a, b)] * (spread[a] * spread[b]))
-    }
-
-    /// Standard deviations of the tolerances' means, in the order of their columns.
-    pub(super) fn mean_spreads(&self) -> Vec<f64> {
-        let directions = nuisance_directions(&self.reference.tolerance);
-        directions.iter().map(|d| self.reference.mean_spread[d.p as usize]).collect()
+        let means = &self.reference.means;
+        means.tr_mul(&(DMatrix::identity(q, q) - inverse)) * means
     }
 
     /// Symmetric matrix of the inner products of lines.
@@ -165,7 +158,8 @@ impl Problem<'_> {
                 for (m, w) in signals.group.modules().iter().zip(self.white(i, signals)) {
                     if !w.is_empty() {
                         let m = *m as usize;
-                        adjoint[m].push((j, self.reference.whiteners[m].adjoint(w)));
+                        let rows = rows(&self.drives[i], m);
+                        adjoint[m].push((j, self.reference.whiteners[m].adjoint(w, rows)));
                     }
                 }
             }
@@ -238,7 +232,8 @@ impl Problem<'_> {
                 for signals in line {
                     for (at, c) in signals.group.modules().iter().zip(self.white(i, signals)) {
                         if *at as usize == m && !c.is_empty() {
-                            let mut back = self.reference.whiteners[m].adjoint(c);
+                            let mut back =
+                                self.reference.whiteners[m].adjoint(c, rows(&self.drives[i], m));
                             back.iter_mut().for_each(|x| *x *= sigma);
                             columns.push(j);
                             filtered.push(back);

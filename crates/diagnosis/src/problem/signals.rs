@@ -6,7 +6,7 @@ use core::ops::Range;
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
-use super::{Direction, Problem, inner, moves};
+use super::{Direction, Problem, inner, moves, rows};
 use crate::causes::param::{SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
 
@@ -236,7 +236,7 @@ impl Problem<'_> {
                     return Vec::new();
                 }
                 let whitener = &self.reference.whiteners[*m as usize];
-                let mut w = whitener.apply(raw, &self.drives[i].valid[*m as usize]);
+                let mut w = whitener.whiten(raw, rows(&self.drives[i], *m as usize));
                 if signals.residual {
                     for x in &mut w {
                         *x = if x.is_finite() { x.clamp(-CLIP, CLIP) } else { CLIP };

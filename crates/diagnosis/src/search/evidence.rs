@@ -7,6 +7,7 @@ pub(crate) mod linear;
 
 use crate::causes::param::Theta;
 use crate::problem::{Direction, Gram, Problem};
+use crate::search::worth::Dispersion;
 
 /// Drives seen through their tolerances. Search, fit, screen and gates speak to this alone.
 pub(crate) trait Evidence {
@@ -18,7 +19,7 @@ pub(crate) trait Evidence {
 
     /// How much more drives in order scatter about the sizes of a hypothesis than their information
     /// says; 1 where no baseline has shown it.
-    fn scatter_of(&self, hypothesis: usize) -> f64;
+    fn scatter_of(&self, hypothesis: usize) -> Dispersion;
 
     /// Gram matrix of the residual at `theta` and the directions from `from`.
     fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram;
@@ -38,8 +39,8 @@ impl Evidence for Problem<'_> {
         self.drives.len()
     }
 
-    fn scatter_of(&self, hypothesis: usize) -> f64 {
-        self.reference.scatter.get(hypothesis).copied().unwrap_or(1.0)
+    fn scatter_of(&self, hypothesis: usize) -> Dispersion {
+        self.reference.scatter.get(hypothesis).copied().unwrap_or(Dispersion::NONE)
     }
 
     fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram {

@@ -130,8 +130,7 @@ impl dyn Evidence + '_ {
                 let of_one_drive = fewer[*i].as_ref().is_none_or(one);
                 // The set without it is more probable (the median probability model: Barbieri and
                 // Berger, Ann. Statist. 32, 2004).
-                let unlikely =
-                    nats.len() > 1 && self.worth(&fit, *i, &nats) + log_odds(PRIOR_CAUSE) < 0.0;
+                let unlikely = self.worth(&fit, *i, &nats) + log_odds(PRIOR_CAUSE) < 0.0;
                 small || of_one_drive || unlikely || self.folds(&fit, *i) < STRONG_NATS
             });
             // The weakest first: beside a cause that is not there the true one may look doubtful, too.

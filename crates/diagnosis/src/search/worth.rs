@@ -5,12 +5,14 @@
 //!
 //! | why a size shows | the size without the cause | worth of `E` nats |
 //! |---|---|---|
-//! | noise that remembers longer than its filter | normal, `phi` times as scattered as drives in order should have it | `E / phi` |
-//! | scatter beside another cause, which no drive in order has shown | Student's t of `n` degrees of freedom | `n/2 ln(1 + 2 E / (n phi))` |
+//! | noise and forms that the model does not have, as drives in order show them | Student's t of `n` degrees of freedom, `phi` times as scattered as those drives should have it | `n/2 ln(1 + 2 E / (n phi))` |
+//! | the same beside another cause, as these drives show it | the same | the same |
 //! | the form of a stronger cause `j` | normal of deviation `tau` | `E` less what that takes |
 //!
-//! The first is a tempered likelihood (Miller and Dunson, J. Am. Stat. Assoc. 114, 2018), with the
-//! dispersion of drives in order about this very size. The third: the form of a cause is known to a part
+//! The first is a tempered likelihood (Miller and Dunson, J. Am. Stat. Assoc. 114, 2018) with a dispersion
+//! that is itself known from a few drives only: from as many as say something of the size, one or two
+//! where the baseline was hardly ever hot or high. Without a baseline nothing is known of it, `E` is what
+//! it is. The third: the form of a cause is known to a part
 //! `rho` of it ([`crate::course`]), along the signals that drive it and in any other way; that part is as
 //! likely to look like one as like another of the `K` causes that show in its modules,
 //! `tau² = rho² |theta_j S_j|² / (K |S|²)` (a discrepancy in the span of what could be mistaken for a
@@ -42,20 +44,48 @@ fn neighbours(own: &Hypothesis) -> usize {
     ids.len()
 }
 
+/// How much more drives in order scatter about a size than their information says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Dispersion {
+    /// Variance over that which is expected, at least 1.
+    pub(crate) ratio: f64,
+    /// Degrees of freedom: drives in order that say something of the size, and the prior's.
+    pub(crate) freedom: f64,
+}
+
+impl Dispersion {
+    /// Where no drive in order has shown more.
+    pub(crate) const NONE: Self = Self { ratio: 1.0, freedom: f64::INFINITY };
+
+    /// What `nats` of evidence are worth: those of Student's t.
+    fn worth(self, nats: f64) -> f64 {
+        let n = self.freedom;
+        if n.is_finite() {
+            0.5 * n * (2.0 * nats / (n * self.ratio)).ln_1p()
+        } else {
+            nats / self.ratio
+        }
+    }
+}
+
 /// How much more drives scatter about the `j`-th direction of a Gram matrix than their information
-/// says, drawn towards one by [`DISPERSION_PRIOR`] drives' worth.
-fn dispersion(gram: &Gram, scores: &[DVector<f64>], j: usize) -> f64 {
-    let drives = gram.per_drive.len() as f64;
+/// says, drawn towards one by [`DISPERSION_PRIOR`] drives' worth. Drives count by what they say of it
+/// (the effective number of weights: Kish, Survey Sampling, 1965).
+fn dispersion(gram: &Gram, scores: &[DVector<f64>], j: usize) -> Dispersion {
     let seen: f64 = scores.iter().map(|s| s[j] * s[j]).sum();
     let expected: f64 = gram.per_drive.iter().map(|g| g[(j + 1, j + 1)]).sum();
-    let ratio = if expected > f64::MIN_POSITIVE { drives * seen / expected } else { drives };
-    (DISPERSION_PRIOR + ratio) / (DISPERSION_PRIOR + drives)
+    let squares: f64 = gram.per_drive.iter().map(|g| g[(j + 1, j + 1)].powi(2)).sum();
+    let told = squares > f64::MIN_POSITIVE;
+    let drives = if told { expected * expected / squares } else { 0.0 };
+    let ratio = if told { drives * seen / expected } else { 0.0 };
+    let freedom = DISPERSION_PRIOR + drives;
+    Dispersion { ratio: (DISPERSION_PRIOR + ratio) / freedom, freedom }
 }
 
 impl dyn Evidence + '_ {
     /// How much more these drives, which are in order, scatter about the sizes of every hypothesis than
     /// their information says, at least 1; the mean over the forms from which it is fitted.
-    pub(crate) fn scatter_in_order(&self) -> Vec<f64> {
+    pub(crate) fn scatter_in_order(&self) -> Vec<Dispersion> {
         let (mut directions, mut owner) = (Vec::new(), Vec::new());
         for (i, h) in CATALOGUE.iter().enumerate() {
             for start in h.starts {
@@ -70,8 +100,11 @@ impl dyn Evidence + '_ {
         let scores = gram.scores(&DVector::zeros(directions.len()));
         let of = |i: usize| {
             let own = (0..owner.len()).filter(|j| owner[*j] == i);
-            let all: Vec<f64> = own.map(|j| dispersion(&gram, &scores, j)).collect();
-            (all.iter().sum::<f64>() / all.len().max(1) as f64).max(1.0)
+            let all: Vec<Dispersion> = own.map(|j| dispersion(&gram, &scores, j)).collect();
+            let mean = |of: fn(&Dispersion) -> f64| {
+                all.iter().map(of).sum::<f64>() / all.len().max(1) as f64
+            };
+            Dispersion { ratio: mean(|d| d.ratio).max(1.0), freedom: mean(|d| d.freedom) }
         };
         (0..CATALOGUE.len()).map(of).collect()
     }
@@ -81,7 +114,7 @@ impl dyn Evidence + '_ {
         let own = nats[i].max(0.0);
         let stronger: Vec<usize> =
             (0..fit.set.len()).filter(|j| (nats[*j], i) > (nats[i], *j)).collect();
-        let noise = own / self.scatter_of(fit.set[i]);
+        let noise = self.scatter_of(fit.set[i]).worth(own);
         if stronger.is_empty() {
             return noise;
         }
@@ -89,14 +122,14 @@ impl dyn Evidence + '_ {
         noise.min(self.beside(fit, i, own)).min(form.max(0.0))
     }
 
-    /// What `nats` of the `i`-th member are worth beside another cause: Student's t with the
-    /// over-dispersion of the member's sizes on these drives alone.
+    /// What `nats` of the `i`-th member are worth beside another cause: with the over-dispersion of the
+    /// member's sizes on these drives alone.
     fn beside(&self, fit: &Fit, member: usize, nats: f64) -> f64 {
         let freedom = self.drives() as f64 - 1.0 + DISPERSION_PRIOR;
         let sizes = CATALOGUE[fit.set[member]].sizes;
         let all = fit.free.iter().zip(self.dispersions(fit));
-        let most = all.filter(|(p, _)| sizes.contains(p)).map(|x| x.1).fold(1.0, f64::max);
-        0.5 * freedom * (2.0 * nats / (freedom * most)).ln_1p()
+        let ratio = all.filter(|(p, _)| sizes.contains(p)).map(|x| x.1).fold(1.0, f64::max);
+        Dispersion { ratio, freedom }.worth(nats)
     }
 
     /// Nats of the `i`-th member that the form of `stronger` ones takes: what its sizes say of a normal

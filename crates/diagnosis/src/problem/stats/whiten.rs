@@ -2,19 +2,32 @@
 //!
 //! The filter is fitted by Levinson-Durbin on the pooled autocovariance of valid pairs and applied
 //! alike to residuals and sensitivities, masked rows counting as zero: generalised least squares
-//! with an AR noise model.
+//! with an AR noise model, and with slow noise beside it ([`super::slow`]) where that was fitted.
+
+use super::slow::Slow;
+
+/// Rows of a record.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rows<'a> {
+    /// Whether each is valid.
+    pub(crate) ok: &'a [bool],
+    /// Signal on which slow noise is a factor; nothing where it is added.
+    pub(crate) carrier: Option<&'a [f64]>,
+}
 
 /// An AR filter and the standard deviation of its innovation.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Whitener {
     pub(crate) coefficients: Vec<f64>,
     pub(crate) sigma: f64,
+    /// Noise that remembers longer than the coefficients reach.
+    pub(crate) slow: Option<Slow>,
 }
 
 impl Whitener {
     /// Unit filter.
     pub(crate) fn white(sigma: f64) -> Self {
-        Self { coefficients: Vec::new(), sigma }
+        Self { coefficients: Vec::new(), sigma, slow: None }
     }
 
     /// Fits order `order` to several records; `None` without valid rows.
@@ -55,7 +68,7 @@ impl Whitener {
             a.push(k);
             error *= 1.0 - k * k;
         }
-        let mut out = Self { coefficients: a, sigma: 1.0 };
+        let mut out = Self { coefficients: a, sigma: 1.0, slow: None };
         let (mut sum, mut count) = (0.0, 0.0);
         for (x, ok) in records {
             for (w, ok) in out.apply(x, ok).iter().zip(ok) {
@@ -70,6 +83,27 @@ impl Whitener {
     }
 
     /// Whitened record, zero where masked.
+    pub(crate) fn whiten(&self, x: &[f64], rows: Rows<'_>) -> Vec<f64> {
+        let mut out = self.apply(x, rows.ok);
+        if let Some(slow) = &self.slow {
+            slow.apply(&mut out, &self.weights(rows));
+        }
+        out
+    }
+
+    /// How much slow noise of one shows in every row that the coefficients have whitened.
+    pub(crate) fn weights(&self, rows: Rows<'_>) -> Vec<f64> {
+        let one = |ok: &bool| if *ok { 1.0 } else { 0.0 };
+        rows.carrier.map_or_else(
+            || rows.ok.iter().map(one).collect(),
+            |x| {
+                let shown: Vec<f64> = x.iter().zip(rows.ok).map(|(x, ok)| x * one(ok)).collect();
+                self.apply(&shown, rows.ok)
+            },
+        )
+    }
+
+    /// The record through the coefficients alone.
     pub(crate) fn apply(&self, x: &[f64], ok: &[bool]) -> Vec<f64> {
         let n = x.len().min(ok.len());
         let mut out = x[..n].to_vec();
@@ -88,9 +122,13 @@ impl Whitener {
 
     /// A whitened record through the adjoint of the filter: its product with any record that is
     /// zero where masked is that of the whitened ones. `x` is zero where masked.
-    pub(crate) fn adjoint(&self, x: &[f64]) -> Vec<f64> {
+    pub(crate) fn adjoint(&self, x: &[f64], rows: Rows<'_>) -> Vec<f64> {
         let scale = 1.0 / self.sigma;
-        let mut out = x.to_vec();
+        let mut x = x.to_vec();
+        if let Some(slow) = &self.slow {
+            slow.adjoint(&mut x, &self.weights(rows));
+        }
+        let mut out = x.clone();
         for (lag, a) in self.coefficients.iter().enumerate() {
             for (y, x) in out.iter_mut().zip(x.iter().skip(lag + 1)) {
                 *y -= a * x;

@@ -8,6 +8,7 @@ use super::Evidence;
 use crate::causes::hypothesis::CATALOGUE;
 use crate::causes::param::{P, PARAMS, Theta};
 use crate::problem::{Direction, Gram, Hat};
+use crate::search::worth::Dispersion;
 
 /// One drive: whitened rows, what each parameter does to them, and the tolerances.
 pub(crate) struct LinearDrive {
@@ -23,13 +24,13 @@ pub(crate) struct LinearDrive {
 pub(crate) struct LinearProblem {
     pub(crate) drives: Vec<LinearDrive>,
     /// Over-dispersion of drives in order about any cause.
-    pub(crate) scatter: f64,
+    pub(crate) scatter: Dispersion,
     zero: Theta,
 }
 
 impl LinearProblem {
     pub(crate) fn new(drives: Vec<LinearDrive>) -> Self {
-        Self { drives, scatter: 1.0, zero: [0.0; PARAMS] }
+        Self { drives, scatter: Dispersion::NONE, zero: [0.0; PARAMS] }
     }
 
     /// Index of a cause.
@@ -90,7 +91,7 @@ impl Evidence for LinearProblem {
         self.drives.len()
     }
 
-    fn scatter_of(&self, _: usize) -> f64 {
+    fn scatter_of(&self, _: usize) -> Dispersion {
         self.scatter
     }
 

@@ -352,11 +352,15 @@ fn what_drives_in_order_scatter_about_a_cause_takes_from_its_evidence() {
         evidence.scatter_in_order()[LinearProblem::cause(ROLLING)]
     };
     // Eight drives against four drives' worth of what is expected.
-    assert!((scattered(1.0) - 1.0).abs() < 1e-9);
-    assert!((scattered(2.0) - (4.0 + 8.0 * 4.0) / 12.0).abs() < 1e-9);
+    assert!((scattered(1.0).ratio - 1.0).abs() < 1e-9);
+    let more = scattered(2.0);
+    assert!((more.ratio - (4.0 + 8.0 * 4.0) / 12.0).abs() < 1e-9);
+    assert!((more.freedom - 12.0).abs() < 1e-9);
     let mut problem = alike(6, &times(&columns[0].1, 0.1), &columns);
-    problem.scatter = scattered(2.0);
+    problem.scatter = more;
     let evidence: &dyn Evidence = &problem;
     let (_, fit, _) = found(&problem, &[ROLLING]);
-    assert!((evidence.worth(&fit, 0, &[42.0]) - 14.0).abs() < 1e-9);
+    // Student's t of twelve degrees of freedom, three times as scattered
+    let worth = 6.0 * (1.0_f64 + 84.0 / 36.0).ln();
+    assert!((evidence.worth(&fit, 0, &[42.0]) - worth).abs() < 1e-9);
 }
