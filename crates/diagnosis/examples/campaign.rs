@@ -1,9 +1,10 @@
 //! Hides effects in generated drives and counts what the diagnosis makes of them:
 //! `campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,channel] [only=cause]
 //! [from=CASE] [to=CASE] [cases=N,N,...] [dump=DIR] [family=1|2]`, KIND one of `clean`, `small`,
-//! `medium`, `large`, `pairs`, `outside`, `deleted`. Two lines per case, one for people (`.` exact,
+//! `medium`, `large`, `pairs`, `outside`, `deleted`, `noise`. Two lines per case, one for people (`.` exact,
 //! `+` first right, `-` nothing, `X` wrong) and one of JSON, then the table. `family=2` takes shapes,
-//! driver, roads and noise that were written apart (`tests/support/second`).
+//! driver, roads and noise that were written apart (`tests/support/second`). KIND `noise` says of the
+//! baseline how sums over rows scatter and how many drives show how much scatter about every cause.
 //! `campaign calibration FILE... [plot=PICTURE.svg]` pools the outputs of runs.
 #![expect(
     clippy::disallowed_macros,
@@ -318,6 +319,27 @@ fn stays_on_the_road(set: &DriveSet) -> bool {
     set.drives.iter().all(wheel)
 }
 
+/// What a baseline knows of its noise: variance of sums over that of white noise, and the scatter about
+/// the sizes of every hypothesis with the drives that show it.
+fn noise(
+    plant: &Plant,
+    baseline: &Baseline,
+    clean: &DriveSet,
+) -> Result<(), Box<dyn std::error::Error>> {
+    for rows in [1, 16, 64, 256, 1024] {
+        for n in baseline.noise_of_sums(plant, clean, rows, &Serial)? {
+            println!(
+                "{rows:4} rows {:22} {:6.2} with slow noise {:6.2}",
+                n.quantity, n.autoregressive, n.slow
+            );
+        }
+    }
+    for s in baseline.scatter_of_sizes() {
+        println!("{:28} {:6.2} times, {:.1} drives", s.id, s.ratio, s.drives);
+    }
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let kind = arguments.first().ok_or(USAGE)?.as_str();
@@ -359,6 +381,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let usual = Campaign { drives: 8, ..campaign };
     let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
     let baseline = Baseline::learn(&plant, &clean, &Serial)?;
+    if kind == "noise" {
+        return noise(&plant, &baseline, &clean);
+    }
     let mut t = Table { family, ..Table::default() };
     for case in 0..count.min(to) {
         let case_seed = seed.wrapping_mul(1_000_003) + case as u64;

@@ -248,3 +248,63 @@ impl Problem<'_> {
         (out, self.reference.means.tr_mul(&against))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use dynamics::TruckParameters;
+
+    use super::*;
+    use crate::problem::course::Point;
+    use crate::problem::nuisance::Changed;
+    use crate::problem::stats::slow::Slow;
+    use crate::replay::Prepared;
+    use crate::replay::tests::recorded;
+    use crate::{Plant, Serial};
+
+    /// The hats are never written out: their sums over blocks have to give what written out ones give,
+    /// where slow noise is added and where it is a factor.
+    #[test]
+    fn hats_beside_slow_noise_are_those_that_are_written_out() {
+        let truck = TruckParameters::load("reference").unwrap();
+        let plant = Plant::of_truck(&truck).unwrap();
+        let drives = vec![Prepared::new(&recorded(&truck, 16_000.0), &plant)];
+        let mut problem = Problem::learn(&plant, drives, false, &Serial).unwrap();
+        let slow = Slow::of(40, [0.02, 0.01, 0.05]);
+        for module in [Module::Torque, Module::Force] {
+            let m = module as usize;
+            problem.reference.whiteners[m].slow = Some(slow.clone());
+            problem.rebuild(Changed::Noise).unwrap();
+            let rows = problem.drives[0].valid[m].iter().enumerate();
+            let place = |(k, ok): (usize, &bool)| {
+                let way = 0.5 + 0.5 * (0.05 * k as f64).sin();
+                ok.then_some((k / 60 % (KNOTS - 1), [1.0 - way, way]))
+            };
+            let places: Vec<Option<(usize, [f64; 2])>> = rows.map(place).collect();
+            assert!(places.iter().flatten().count() > 100, "{module:?}");
+            let written = |_: usize| -> Vec<Vec<f64>> {
+                let size = |at: &Option<(usize, [f64; 2])>, knot: usize| {
+                    at.map_or(0.0, |(j, x)| {
+                        if j == knot {
+                            x[0]
+                        } else if j + 1 == knot {
+                            x[1]
+                        } else {
+                            0.0
+                        }
+                    })
+                };
+                (0..KNOTS).map(|knot| places.iter().map(|at| size(at, knot)).collect()).collect()
+            };
+            let at = Point::bare(problem.reference.theta);
+            let (hats, of_means) = problem.hats(0, m, &places, &problem.rest(0, &at));
+            let direct = problem.gram_beside(&problem.reference.theta, &[], module, &written);
+            let near = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).norm() < 1e-8 * b.norm();
+            assert!(
+                near(&hats, &direct.per_drive[0]),
+                "{module:?}: {hats} {}",
+                direct.per_drive[0]
+            );
+            assert!(near(&of_means, &direct.common[0]), "{module:?}");
+        }
+    }
+}

@@ -10,7 +10,9 @@ mod calibrate;
 pub(crate) mod course;
 mod gram;
 mod hat;
+mod means;
 mod moved;
+pub(crate) mod noise;
 mod nuisance;
 mod signals;
 pub(crate) mod stats;
@@ -19,9 +21,10 @@ pub(crate) use gram::Gram;
 pub(crate) use moved::moves;
 pub(crate) use nuisance::Rest;
 
+use means::means_apart;
 #[cfg(test)]
-pub(crate) use calibrate::resolution;
-use calibrate::{Noise, fit_whiteners, means_apart};
+pub(crate) use noise::resolution;
+use noise::{Noise, fit_whiteners};
 use nuisance::{Changed, Nuisance};
 use signals::Kept;
 

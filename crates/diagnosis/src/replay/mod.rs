@@ -106,7 +106,7 @@ impl Module {
         }
     }
 
-    /// Time between two rows of the module, s.
+    /// Samples between two rows of the module.
     pub(crate) fn row_step(self) -> usize {
         match self {
             M::Force | M::Altitude | M::Heading | M::Imu => 20,

@@ -18,7 +18,7 @@ pub(crate) trait Evidence {
     fn drives(&self) -> usize;
 
     /// How much more drives in order scatter about the sizes of a hypothesis than their information
-    /// says; 1 where no baseline has shown it.
+    /// says; [`Dispersion::NONE`] where no baseline has shown it.
     fn scatter_of(&self, hypothesis: usize) -> Dispersion;
 
     /// Gram matrix of the residual at `theta` and the directions from `from`.

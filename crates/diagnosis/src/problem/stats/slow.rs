@@ -34,11 +34,13 @@ pub(crate) struct Slow {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gain {
     /// Sum of the squares of the weights.
-    count: f64,
+    weight: f64,
     /// What an innovation adds to the processes.
     kalman: [f64; PROCESSES],
     /// Deviation of the mean of white noise over that of the innovation.
     shrink: f64,
+    /// What the processes keep until the next block.
+    keep: [f64; PROCESSES],
 }
 
 /// State of the filter: the processes as the blocks before predict them.
@@ -48,9 +50,9 @@ pub(crate) struct State([f64; PROCESSES]);
 impl State {
     /// Innovation of a block with this `mean`, and on to the next block.
     pub(crate) fn innovation(&mut self, gain: &Gain, mean: f64) -> f64 {
-        let e = if gain.count > 0.0 { mean - self.0.iter().sum::<f64>() } else { 0.0 };
-        for ((s, k), memory) in self.0.iter_mut().zip(&gain.kalman).zip(&MEMORY) {
-            *s = (*s + k * e) * (-1.0 / memory).exp();
+        let e = if gain.weight > 0.0 { mean - self.0.iter().sum::<f64>() } else { 0.0 };
+        for ((s, k), keep) in self.0.iter_mut().zip(&gain.kalman).zip(&gain.keep) {
+            *s = (*s + k * e) * keep;
         }
         e
     }
@@ -60,8 +62,8 @@ impl Gain {
     /// What is added to the product of two whitened records by block sums `a` and `b` with innovations
     /// `ea` and `eb`.
     pub(crate) fn product(&self, (a, ea): (f64, f64), (b, eb): (f64, f64)) -> f64 {
-        if self.count > 0.0 {
-            self.count * self.shrink * self.shrink * ea * eb - a * b / self.count
+        if self.weight > 0.0 {
+            self.weight * self.shrink * self.shrink * ea * eb - a * b / self.weight
         } else {
             0.0
         }
@@ -69,11 +71,16 @@ impl Gain {
 
     /// Mean of a block from its sum.
     pub(crate) fn mean(&self, sum: f64) -> f64 {
-        if self.count > 0.0 { sum / self.count } else { 0.0 }
+        if self.weight > 0.0 { sum / self.weight } else { 0.0 }
     }
 }
 
 impl Slow {
+    #[cfg(test)]
+    pub(crate) fn of(block: usize, power: [f64; PROCESSES]) -> Self {
+        Self { block, power }
+    }
+
     /// The most probable one of records that an AR filter has whitened, zero where masked, with the
     /// weights of their rows; `None` where slow noise makes them no more probable.
     pub(crate) fn fit(records: &[(Vec<f64>, Vec<f64>)], block: usize) -> Option<Self> {
@@ -142,7 +149,7 @@ impl Slow {
         for (j, p) in self.power.iter().enumerate() {
             covariance[j][j] = *p;
         }
-        Filter { power: self.power, covariance }
+        Filter { power: self.power, keep: MEMORY.map(|m| (-1.0 / m).exp()), covariance }
     }
 
     /// The filter at every block of a record with these weights.
@@ -168,17 +175,15 @@ impl Slow {
         let mut after = [0.0; PROCESSES];
         let blocks = x.chunks_mut(self.block).zip(weights.chunks(self.block)).zip(&gains);
         for ((x, w), gain) in blocks.rev() {
-            for (a, memory) in after.iter_mut().zip(&MEMORY) {
-                *a *= (-1.0 / memory).exp();
-            }
-            if gain.count == 0.0 {
+            after.iter_mut().zip(&gain.keep).for_each(|(a, keep)| *a *= keep);
+            if gain.weight == 0.0 {
                 continue;
             }
             let sum = inner(w, x);
             let fed: f64 = after.iter().zip(&gain.kalman).map(|(a, k)| a * k).sum();
             let e = gain.shrink * sum + fed;
             after.iter_mut().for_each(|a| *a -= e);
-            let shift = (e - sum) / gain.count;
+            let shift = (e - sum) / gain.weight;
             x.iter_mut().zip(w).for_each(|(x, w)| *x += w * shift);
         }
     }
@@ -187,20 +192,21 @@ impl Slow {
 /// What the filter knows before a block.
 struct Filter {
     power: [f64; PROCESSES],
+    keep: [f64; PROCESSES],
     covariance: [[f64; PROCESSES]; PROCESSES],
 }
 
 impl Filter {
     /// Takes a block of this weight and goes on to the next; with the variance of its innovation.
-    fn next(&mut self, count: f64) -> (Gain, f64) {
-        let (p, keep) = (&mut self.covariance, MEMORY.map(|m| (-1.0 / m).exp()));
-        let mut gain = Gain { count, kalman: [0.0; PROCESSES], shrink: 0.0 };
+    fn next(&mut self, weight: f64) -> (Gain, f64) {
+        let (p, keep) = (&mut self.covariance, self.keep);
+        let mut gain = Gain { weight, kalman: [0.0; PROCESSES], shrink: 0.0, keep };
         let sums = p.map(|row| row.iter().sum::<f64>());
         let mut variance = sums.iter().sum::<f64>();
-        if count > 0.0 {
-            variance += count.recip();
+        if weight > 0.0 {
+            variance += weight.recip();
             gain.kalman = sums.map(|s| s / variance);
-            gain.shrink = (count * variance).sqrt().recip();
+            gain.shrink = (weight * variance).sqrt().recip();
             for (row, k) in p.iter_mut().zip(&gain.kalman) {
                 row.iter_mut().zip(&sums).for_each(|(x, s)| *x -= k * s);
             }
