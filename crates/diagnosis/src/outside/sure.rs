@@ -10,8 +10,7 @@ use crate::problem::Problem;
 use crate::problem::course::Point;
 use crate::replay::Module;
 use crate::search::decisions::{
-    ACCOUNTED, AHEAD, BESIDE, CATCH_ALL, CATCH_ALL_PART, CROWD, FOLLOWS, FREE_FORM_TIMES, MISFIT,
-    REPLACED_MANY, UNKNOWN_EVIDENCE,
+    AHEAD, CATCH_ALL, CATCH_ALL_PART, CROWD, FREE_FORM_TIMES, REPLACED_MANY, UNKNOWN_EVIDENCE,
 };
 use crate::search::refit::Fit;
 
@@ -75,25 +74,18 @@ fn against_functions(
     let best_bare = bare.first().map_or(0.0, |s| s.log_z);
     if let Some(random) = problem.restless(&Point::of(empty))
         && random.evidence > best_bare
-        && bare.first().is_none_or(|s| s.module != random.module || s.explained_frac < FOLLOWS)
+        && bare.first().is_none_or(|s| s.module != random.module)
     {
         let left = apart(problem, empty, &fit, random.module);
         if random.evidence > AHEAD * (fit.log_z - left.log_z) {
             return (left, Some(noise(&random)), Sure::Outside);
         }
     }
+    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > AHEAD * fit.log_z {
+        return (elsewhere(problem, empty, &fit, bare), describe(bare), Sure::Outside);
+    }
     let rest = if fit.set.is_empty() { bare.to_vec() } else { beyond(problem, &Point::of(&fit)) };
     let left = rest.first().map_or(0.0, |s| s.firm);
-    if bare.first().is_some_and(|s| s.firm > UNKNOWN_EVIDENCE) && best_bare > AHEAD * fit.log_z {
-        let best_rest = rest.first().map_or(0.0, |s| s.log_z);
-        if !fit.set.is_empty() && fit.log_z + best_rest > BESIDE * best_bare {
-            return (fit, describe(&rest), Sure::Outside);
-        }
-        let accounted = left < UNKNOWN_EVIDENCE && best_rest < ACCOUNTED * best_bare;
-        if fit.set.is_empty() || !accounted {
-            return (elsewhere(problem, empty, &fit, bare), describe(bare), Sure::Outside);
-        }
-    }
     if left > UNKNOWN_EVIDENCE {
         let share = rest.first().map_or(0, |s| sharing(&fit, s.module));
         // Causes that leave much and that one free function replaces stand in for it.
@@ -198,20 +190,14 @@ fn sharing(fit: &Fit, module: Module) -> usize {
 }
 
 /// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
-/// module, a module that they explain keeps more variance than drives in order have, or a size
-/// or a form has run to its bound.
+/// module, or a size or a form has run to its bound.
 fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
-    let now = problem.settled(&Point::of(fit));
-    let strained = Module::ALL.into_iter().any(|m| {
-        let share = sharing(fit, m);
-        let excess = now[m as usize] / problem.reference.settled[m as usize].max(1.0);
-        share >= CROWD || (share > 0 && excess > MISFIT)
-    });
+    let crowded = Module::ALL.into_iter().any(|m| sharing(fit, m) >= CROWD);
     let zero = &problem.reference.theta;
     let ends = |h: &usize| {
         CATALOGUE[*h].is_at_bound(&fit.theta, zero) || CATALOGUE[*h].strays(&fit.theta, zero)
     };
-    strained || fit.set.iter().any(ends)
+    crowded || fit.set.iter().any(ends)
 }
 
 /// What the best of some free functions says, with the signals that say nearly as much.

@@ -10,7 +10,7 @@ use crate::problem::stats::evidence;
 use crate::problem::{Problem, Rest};
 use crate::replay::signal::{SIGNALS, Signal, means};
 use crate::replay::{Module, Prepared};
-use crate::search::decisions::{FACTOR, FUNCTION_DISPERSION_PRIOR, RESTLESS, RESTLESS_ALONE};
+use crate::search::decisions::{RESTLESS, RESTLESS_ALONE, RHO, SCATTER_PRIOR};
 
 /// Knots of the spline.
 pub(crate) const KNOTS: usize = 9;
@@ -103,7 +103,7 @@ fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
 
 /// How much more the drives disagree about a free function than their noise says, at least 1: the
 /// ratio of their score contributions to the expected ones, drawn towards one by
-/// [`FUNCTION_DISPERSION_PRIOR`] drives' worth. Bursts of model error (a hard stop) are not white
+/// [`SCATTER_PRIOR`] drives' worth. Bursts of model error (a hard stop) are not white
 /// noise, and evidence counts for less by this factor.
 pub(crate) fn dispersion(
     systems: &[(DMatrix<f64>, DVector<f64>)],
@@ -119,7 +119,7 @@ pub(crate) fn dispersion(
         expected += (a * &inverse).trace();
     }
     let ratio = drives * seen / f64::max(expected, 1e-9);
-    Some(((FUNCTION_DISPERSION_PRIOR + ratio) / (FUNCTION_DISPERSION_PRIOR + drives)).max(1.0))
+    Some(((SCATTER_PRIOR + ratio) / (SCATTER_PRIOR + drives)).max(1.0))
 }
 
 impl Problem<'_> {
@@ -177,7 +177,7 @@ impl Problem<'_> {
                 out.extend(self.shape(at, form, (*size, excess), values, &residuals));
                 if let (Some(weights), true) = (&weights, SLOW.contains(&signal.name)) {
                     let form = (*module, signal, Some(weights.as_slice()));
-                    out.extend(self.shape(at, form, (FACTOR, excess), values, &residuals));
+                    out.extend(self.shape(at, form, (RHO, excess), values, &residuals));
                 }
             }
         }

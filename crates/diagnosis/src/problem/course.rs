@@ -23,7 +23,7 @@ use crate::causes::hypothesis::{Along, CATALOGUE, Hypothesis};
 use crate::causes::param::{P, Theta};
 use crate::problem::{Direction, Gram, Hat};
 use crate::replay::signal::signal;
-use crate::search::decisions::{RHO, RHO_SHAPE, TAU, WEATHER};
+use crate::search::decisions::{RHO, RHO_SHAPE, WEATHER};
 use crate::search::free::directions;
 use crate::search::refit::Fit;
 
@@ -81,7 +81,7 @@ impl Effect {
 
     /// Its scatter between drives, in its size.
     fn between(&self) -> f64 {
-        if weather(self.of) { WEATHER } else { TAU }
+        if weather(self.of) { WEATHER } else { RHO }
     }
 }
 
@@ -281,7 +281,7 @@ mod tests {
         let course = Course::of(&sizes, &mut directions);
         let sigma = course.deviations(directions.len(), &theta, &zero);
         assert_eq!(sigma[..2], [WEATHER * 5.0; 2]);
-        assert_eq!(sigma[2], TAU * 0.1);
+        assert_eq!(sigma[2], RHO * 0.1);
         let hats = &sigma[3..3 + 2 * OF_WEATHER];
         assert!(hats.iter().all(|x| *x == WEATHER * 5.0), "{hats:?}");
     }

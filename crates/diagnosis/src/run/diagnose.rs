@@ -14,8 +14,8 @@ use crate::problem::course::Point;
 use crate::replay::{Module, Prepared};
 use crate::run::drive_use::{DriveRole, drive_uses};
 use crate::run::report_models::Models;
-use crate::search::decisions::{EXPLAINED, MIN_EVIDENCE};
-use crate::search::weights::outweighed;
+use crate::search::decisions::{MIN_EVIDENCE, STRONG_NATS};
+use crate::search::weights::{log_odds, outweighed};
 use crate::{
     Action, Diagnosis, DiagnosisError, DriveSet, Executor, Finding, FindingKind, Plant, Verdict,
 };
@@ -129,7 +129,7 @@ pub fn diagnose_with(
     };
     let answer = causes(&problem, &fit, &empty, &open, &bare);
     // What may be there in place of a cause is said as far as it makes the cause unsure.
-    let doubts = answer.instead.iter().filter(|(_, p)| *p > 1.0 - EXPLAINED);
+    let doubts = answer.instead.iter().filter(|(_, p)| log_odds(*p) > -STRONG_NATS);
     let doubts: Vec<Shape> = doubts.map(|(s, _)| s.clone()).collect();
     let functions = answer.instead.iter().map(|(_, p)| p).sum();
     let stated: Vec<_> = answer.causes.iter().map(|c| (c.cause.id, c.cause.probability)).collect();
@@ -156,7 +156,9 @@ pub fn diagnose_with(
         Verdict::Unknown
     } else if fit.set.is_empty() {
         Verdict::NothingToExplain
-    } else if sure == Sure::Not || causes.iter().any(|c| c.cause.probability < EXPLAINED) {
+    } else if sure == Sure::Not
+        || causes.iter().any(|c| log_odds(c.cause.probability) < STRONG_NATS)
+    {
         Verdict::Ambiguous
     } else {
         Verdict::Explained

@@ -6,11 +6,9 @@
 
 // The model's priors.
 
-/// Scatter of a cause's size between drives, in its size. Flat evidence from 0 to 0.05 in the first
-/// family.
-pub(crate) const TAU: f64 = 0.03;
-/// Deviation of a cause's course along a signal, in its size, where physics gives its law: what laws of
-/// drag or rolling resistance leave out.
+/// Deviation of a cause's size between drives, and of its course along a signal, in its size, where
+/// physics gives its law: what laws of drag or rolling resistance leave out. Prior deviation of a free
+/// factor on a module's quantity.
 pub(crate) const RHO: f64 = 0.05;
 /// The same where the law is what a maker chose or a component happens to do, and the catalogue's is
 /// one of many: a quarter more or less is still that cause (the meaning of the word, not fitted). Not
@@ -24,16 +22,13 @@ pub(crate) const WEATHER: f64 = 0.2;
 pub(crate) const PRIOR_CAUSE: f64 = 0.005;
 /// Probability of a free function: of some two hundred that are tried one, in one truck in a hundred.
 pub(crate) const PRIOR_FUNCTION: f64 = 5e-5;
-/// Prior deviation of a free factor on a module's quantity, 1: a few per cent.
-pub(crate) const FACTOR: f64 = 0.05;
-/// Drives' worth of the expected scatter that a baseline has to outweigh.
+/// Drives' worth of the expected scatter that a baseline's tolerances, or drives about a free function,
+/// have to outweigh.
 pub(crate) const SCATTER_PRIOR: f64 = 2.0;
-/// Deviation of a tolerance's mean, in its scatter.
-pub(crate) const MEAN_PRIOR: f64 = 0.7;
 /// Drives' worth of the expectation that drives scatter about a cause's size as their information says.
 pub(crate) const DISPERSION_PRIOR: f64 = 4.0;
-/// The same about a free function, whose knots see the drives differently.
-pub(crate) const FUNCTION_DISPERSION_PRIOR: f64 = 2.0;
+/// Deviation of a tolerance's mean, in its scatter.
+pub(crate) const MEAN_PRIOR: f64 = 0.7;
 /// Evidence of a free function that a drive in order may have where no baseline says how much, nats: a
 /// third of the most that one of another simulator had.
 pub(crate) const FREE_FORM_NATS: f64 = 12.0;
@@ -42,32 +37,19 @@ pub(crate) const FREE_FORM_TIMES: f64 = 3.0;
 
 // What is looked for and kept.
 
-/// Least evidence for a first cause, nats: clean (one of the causes reaches it once in some hundred
-/// trucks).
-pub(crate) const MIN_FIRST: f64 = 6.0;
 /// Least evidence for another cause, and for a first one that has a rival, nats: clean.
 pub(crate) const MIN_EVIDENCE: f64 = 10.0;
-/// Evidence that another cause, or fewer causes, in the place of one must add, nats: less is a tie, and
-/// what was found first stays.
-pub(crate) const SWAP_NATS: f64 = 1.0;
 /// Evidence that tells two explanations apart, nats: odds of twenty, where "strong" begins (Kass and
-/// Raftery, J. Am. Stat. Assoc. 90, 1995). For rivals, unseen halves and drives held out.
+/// Raftery, J. Am. Stat. Assoc. 90, 1995). For rivals, drives held out and the odds of a cause that is
+/// stated as the explanation.
 pub(crate) const STRONG_NATS: f64 = 3.0;
 /// Evidence within which another cause is listed, nats: where "very strong" begins (the same).
 pub(crate) const LISTED_NATS: f64 = 5.0;
-/// Deviations by which a size must differ from nothing once the drives' disagreement counts: 99 %.
-pub(crate) const MIN_SIGMAS: f64 = 2.6;
 /// Part of the smallest size worth a word below which a cause is dropped, 1: policy.
 pub(crate) const WORTH: f64 = 0.5;
-/// Part of the gain expected of all drives but the best below which a wind is of one drive, 1: clean.
-pub(crate) const SHARED: f64 = 0.5;
-/// Part of the information about a cause in one drive above which no other can confirm it, 1.
-pub(crate) const LONELY: f64 = 0.85;
 
 // Sure or not.
 
-/// Probability above which a cause is stated as the explanation, 1: policy.
-pub(crate) const EXPLAINED: f64 = 0.95;
 /// Evidence that a free function needs beside or instead of named causes, nats: clean.
 pub(crate) const UNKNOWN_EVIDENCE: f64 = 30.0;
 /// Evidence of a free function or a disturbance over that of causes above which it wins, 1. Where
@@ -80,19 +62,8 @@ pub(crate) const RANKED: f64 = 0.5;
 /// Part of the evidence of several causes of one module above which a free function replaces them if
 /// they leave much over, 1.
 pub(crate) const REPLACED_MANY: f64 = 0.5;
-/// Evidence of causes and of what is left beside them, in that of the best function without causes, above
-/// which they are about different things, 1.
-pub(crate) const BESIDE: f64 = 1.5;
-/// Part of the evidence of the best function that may be left beside causes that account for it, 1: it
-/// takes a steady force along, which tolerances share with a cause.
-pub(crate) const ACCOUNTED: f64 = 0.2;
-/// Part of a module's excess below which a function of a signal does not describe what is left, 1: noise
-/// that comes and goes gives every signal something.
-pub(crate) const FOLLOWS: f64 = 0.05;
-/// Variance over that of drives in order in a module that a cause explains, above which it is not sure,
-/// 1: clean.
-pub(crate) const MISFIT: f64 = 1.2;
-/// The same in tractor and trailer yaw alike that is a disturbance of its own, 1: clean.
+/// Variance over that of drives in order, in tractor and trailer yaw alike, that is a disturbance of its
+/// own, 1: clean.
 pub(crate) const RESTLESS: f64 = 1.1;
 /// The same in one module alone, 1: clean.
 pub(crate) const RESTLESS_ALONE: f64 = 2.0;

@@ -1,30 +1,26 @@
-//! Which of the fitted causes are kept: large enough for a word, beyond what the drives disagree
-//! about, of more than one drive, and worth something on drives that they were not fitted to.
+//! Which of the fitted causes are kept: large enough for a word, and there more probably than not, by
+//! what they are worth once the drives' disagreement counts ([`crate::search::worth`]).
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use crate::causes::hypothesis::CATALOGUE;
 use crate::problem::Direction;
-use crate::problem::stats::evidence;
 use crate::search::decisions::{
-    DISPERSION_PRIOR, LONELY, MIN_SIGMAS, OWN_SIZES, OWN_SIZES_PART, PRIOR_CAUSE, SHARED,
-    STRONG_NATS, WORTH,
+    DISPERSION_PRIOR, OWN_SIZES, OWN_SIZES_PART, PRIOR_CAUSE, STRONG_NATS, WORTH,
 };
 use crate::search::evidence::Evidence;
 use crate::search::free::prior;
 use crate::search::refit::Fit;
 use crate::search::weights::log_odds;
 
-/// Information of every drive about a member's sizes, in their priors: what it says of the cause as the
-/// catalogue has it, which a course of its own would cap.
-fn about(fit: &Fit, member: usize) -> Vec<f64> {
-    let hyp = &CATALOGUE[fit.set[member]];
-    let own: Vec<(usize, f64)> = (0..fit.free.len())
-        .filter(|j| hyp.sizes.contains(&fit.free[*j]))
-        .map(|j| (j + 1, fit.free[j].spec().prior.powi(2)))
-        .collect();
-    let of = |g: &DMatrix<f64>| own.iter().map(|(j, v)| g[(*j, *j)] * v).sum();
-    fit.whole.per_drive.iter().map(of).collect()
+/// The gain over `fewer` causes is of one drive, and the others speak against it: a day of strong wind, not
+/// what the drives have in common. A tolerance takes what is linear along; where an effect is not, one
+/// drive far out looks like a cause.
+fn from_one_drive(fit: &Fit, fewer: &Fit) -> bool {
+    let drives = fit.gram.per_drive.iter().zip(&fewer.gram.per_drive);
+    let gains: Vec<f64> = drives.map(|(with, less)| 0.5 * (less[(0, 0)] - with[(0, 0)])).collect();
+    let most = gains.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    gains.len() > 2 && gains.iter().sum::<f64>() - most < -STRONG_NATS
 }
 
 impl dyn Evidence + '_ {
@@ -114,9 +110,8 @@ impl dyn Evidence + '_ {
         out
     }
 
-    /// Takes out causes that are too small for a word, within the drives' disagreement, or that do
-    /// not pay on drives they were not fitted to (two folds of whole drives, linear refit around
-    /// the joint fit).
+    /// Takes out causes that are too small for a word, those without which the set is more probable (the
+    /// median probability model: Barbieri and Berger, Ann. Statist. 32, 2004), and the wind of one day.
     pub(crate) fn gate(&self, fit: Fit, empty: &Fit) -> Fit {
         let mut fit = fit;
         loop {
@@ -125,13 +120,10 @@ impl dyn Evidence + '_ {
             let doubtful = (0..fit.set.len()).filter(|i| {
                 let hyp = &CATALOGUE[fit.set[*i]];
                 let size = hyp.size(&fit.theta, self.zero()).abs();
-                let small = size < WORTH * hyp.min_size || !self.stands_out(&fit, *i, nats[*i]);
-                let one = |f: &Fit| hyp.nonlinear() && Self::from_one_drive(&fit, *i, f);
-                let of_one_drive = fewer[*i].as_ref().is_none_or(one);
-                // The set without it is more probable (the median probability model: Barbieri and
-                // Berger, Ann. Statist. 32, 2004).
+                let small = size < WORTH * hyp.min_size;
                 let unlikely = self.worth(&fit, *i, &nats) + log_odds(PRIOR_CAUSE) < 0.0;
-                small || of_one_drive || unlikely || self.folds(&fit, *i) < STRONG_NATS
+                let one = |f: &Fit| hyp.nonlinear() && from_one_drive(&fit, f);
+                small || unlikely || fewer[*i].as_ref().is_none_or(one)
             });
             // The weakest first: beside a cause that is not there the true one may look doubtful, too.
             let weakest = doubtful.min_by(|i, j| nats[*i].total_cmp(&nats[*j]));
@@ -140,86 +132,5 @@ impl dyn Evidence + '_ {
             fit = without.clone();
         }
         fit
-    }
-
-    /// The gain of the `i`-th member is of one drive, although others say as much about it: a day of
-    /// strong wind, not what the drives have in common. A tolerance takes what is linear along; where
-    /// an effect is not, one drive far out looks like a cause.
-    fn from_one_drive(fit: &Fit, member: usize, fewer: &Fit) -> bool {
-        let drives = fit.gram.per_drive.iter().zip(&fewer.gram.per_drive);
-        let gains: Vec<f64> = drives.map(|(with, less)| less[(0, 0)] - with[(0, 0)]).collect();
-        let known = about(fit, member);
-        let best = gains.iter().enumerate().max_by(|x, y| x.1.total_cmp(y.1));
-        best.is_some_and(|(top, most)| {
-            let (gain, all) = (gains.iter().sum::<f64>(), known.iter().sum::<f64>());
-            let expected = gain * (1.0 - known[top] / all.max(f64::MIN_POSITIVE));
-            gains.len() > 2 && gain - most < SHARED * expected
-        })
-    }
-
-    /// What the `i`-th member adds is beyond what the drives disagree about: `nats` of evidence, over the
-    /// over-dispersion of the drives about its sizes, are more than [`MIN_SIGMAS`]. Its size over its
-    /// interval does not say it: that of a fade or of a crosswind is known no better than its form, however
-    /// much the two explain together (Hauck and Donner, J. Am. Stat. Assoc. 72, 1977).
-    fn stands_out(&self, fit: &Fit, member: usize, nats: f64) -> bool {
-        let own = CATALOGUE[fit.set[member]].sizes;
-        let of_sizes = fit.free.iter().zip(self.dispersions(fit));
-        let over = of_sizes.filter(|(p, _)| own.contains(p)).map(|(_, phi)| phi);
-        2.0 * nats > MIN_SIGMAS * MIN_SIGMAS * over.fold(0.0, f64::max)
-    }
-
-    /// Gain of the `i`-th member on unseen halves of the drives, nats. Its own course is not taken
-    /// out: what a half can take of it is no question of whether it is there.
-    fn folds(&self, fit: &Fit, member: usize) -> f64 {
-        if self.drives() < 2 {
-            return f64::INFINITY;
-        }
-        let keep: Vec<usize> = (0..=fit.free.len()).collect();
-        let others = fit.course.without(CATALOGUE[fit.set[member]].sizes);
-        let Some(gram) = others.taken_out(&fit.whole, &keep, &fit.theta, self.zero()) else {
-            return f64::NEG_INFINITY;
-        };
-        let zero = self.zero();
-        let sigma = prior(&fit.free);
-        // Shapes stay where they are: with them a size of nothing is no effect, as it is not along
-        // the tangent of a threshold.
-        let sizes = fit.sizes();
-        let own = CATALOGUE[fit.set[member]].sizes;
-        let all: Vec<usize> =
-            (0..fit.free.len()).filter(|j| sizes.contains(&fit.free[*j])).collect();
-        let others: Vec<usize> =
-            all.iter().copied().filter(|j| !own.contains(&fit.free[*j])).collect();
-        let x0 = DVector::from_fn(fit.free.len(), |j, _| {
-            let p = fit.free[j];
-            if all.contains(&j) { fit.theta[p as usize] - zero[p as usize] } else { 0.0 }
-        });
-        // Drives that say most about the member are dealt to the halves in turn; where one drive
-        // alone says it (hot brakes once), no other can confirm it.
-        let mut order: Vec<(usize, f64)> = about(fit, member).into_iter().enumerate().collect();
-        order.sort_by(|x, y| y.1.total_cmp(&x.1));
-        let total: f64 = order.iter().map(|o| o.1).sum();
-        if order.first().is_none_or(|o| o.1 > LONELY * total) {
-            return f64::INFINITY;
-        }
-        // 0, 1, 1, 0, 0, 1, ...: the halves get the like.
-        let half = |d: usize| {
-            order.iter().position(|o| o.0 == d).is_some_and(|rank| rank.div_ceil(2) % 2 == 1)
-        };
-        let mut gain = 0.0;
-        for fold in [false, true] {
-            let (a, b, _) = gram.sum(|d| half(d) != fold);
-            let (at, bt, _) = gram.sum(|d| half(d) == fold);
-            let (b, bt) = (&b + &a * &x0, &bt + &at * &x0);
-            let score = |keep: &[usize]| -> Option<f64> {
-                let s: Vec<f64> = keep.iter().map(|j| sigma[*j]).collect();
-                let (_, x) =
-                    evidence::linear(&evidence::sub(&a, keep), &evidence::pick(&b, keep), &s)?;
-                let (at, bt) = (evidence::sub(&at, keep), evidence::pick(&bt, keep));
-                Some(bt.dot(&x) - 0.5 * (&at * &x).dot(&x))
-            };
-            gain += score(&all).unwrap_or(0.0)
-                - if others.is_empty() { 0.0 } else { score(&others).unwrap_or(0.0) };
-        }
-        gain
     }
 }

@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::causes::hypothesis::CATALOGUE;
 use crate::causes::param::{P, PARAMS, Theta};
-use crate::problem::course::Course;
 use crate::problem::stats::evidence;
 use crate::problem::{Gram, moves};
 use crate::search::evidence::Evidence;
@@ -37,7 +36,6 @@ pub(crate) struct Fit {
     pub(crate) gram: Gram,
     /// The same and the hats of the courses, nothing taken out.
     pub(crate) whole: Gram,
-    pub(crate) course: Course,
     /// Residual norm at the fit.
     pub(crate) norm: f64,
 }
@@ -227,7 +225,6 @@ impl dyn Evidence + '_ {
             covariance,
             gram: at.gram,
             whole: at.whole,
-            course: at.along.course,
             norm,
         })
     }

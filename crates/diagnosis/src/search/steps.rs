@@ -9,10 +9,11 @@
 use crate::causes::hypothesis::{CATALOGUE, Hypothesis};
 use crate::causes::param::{PARAMS, Spec, Theta};
 use crate::replay::affects;
-use crate::search::decisions::{AHEAD, MIN_EVIDENCE, MIN_FIRST, RANKED, SWAP_NATS};
+use crate::search::decisions::{AHEAD, MIN_EVIDENCE, PRIOR_CAUSE, RANKED};
 use crate::search::evidence::Evidence;
 use crate::search::refit::{Beyond, Fit};
 use crate::search::screen::{Candidate, Screen, outside};
+use crate::search::weights::log_odds;
 
 /// Hypotheses refitted per step.
 const REFIT: usize = 4;
@@ -111,16 +112,16 @@ impl dyn Evidence + '_ {
             let Some(one) = self.with_added(&there, &pair[0], zero_norm, f64::NEG_INFINITY) else {
                 continue;
             };
-            let needed = if one.set.len() >= best.set.len() { MIN_EVIDENCE } else { SWAP_NATS };
+            let needed = if one.set.len() >= best.set.len() { MIN_EVIDENCE } else { 0.0 };
             let least = winner.as_ref().map_or(best.log_z + needed, |w| w.log_z);
             winner = self.with_added(&one, &pair[1], zero_norm, least).or(winner);
         }
         winner
     }
 
-    /// What another cause must add to `best`, nats.
+    /// What another cause must add to `best`, nats: a first one at least its prior odds.
     pub(crate) fn threshold(best: &Fit) -> f64 {
-        if best.set.is_empty() { MIN_FIRST } else { MIN_EVIDENCE }
+        if best.set.is_empty() { -log_odds(PRIOR_CAUSE) } else { MIN_EVIDENCE }
     }
 
     /// The set with the cause that says most beyond it, if that is enough.
@@ -219,8 +220,7 @@ impl dyn Evidence + '_ {
                         if f.log_z + c.gain < best.log_z - 20.0 - 0.1 * (best.log_z - f.log_z) {
                             continue;
                         }
-                        let least = best.log_z + SWAP_NATS;
-                        if let Some(s) = self.with_added(&f, c, zero_norm, least) {
+                        if let Some(s) = self.with_added(&f, c, zero_norm, best.log_z) {
                             (best, screen) = (s, None);
                             changed = true;
                             break;

@@ -6,7 +6,7 @@
 //! | why a size shows | the size without the cause | worth of `E` nats |
 //! |---|---|---|
 //! | noise and forms that the model does not have, as drives in order show them | Student's t of `n` degrees of freedom, `phi` times as scattered as those drives should have it | `n/2 ln(1 + 2 E / (n phi))` |
-//! | the same beside another cause, as these drives show it | the same | the same |
+//! | the same, as these drives show it | the same | the same |
 //! | the form of a stronger cause `j` | normal of deviation `tau` | `E` less what that takes |
 //!
 //! The first is a tempered likelihood (Miller and Dunson, J. Am. Stat. Assoc. 114, 2018) with a dispersion
@@ -114,17 +114,17 @@ impl dyn Evidence + '_ {
         let own = nats[i].max(0.0);
         let stronger: Vec<usize> =
             (0..fit.set.len()).filter(|j| (nats[*j], i) > (nats[i], *j)).collect();
-        let noise = self.scatter_of(fit.set[i]).worth(own);
+        let noise = self.scatter_of(fit.set[i]).worth(own).min(self.agreed(fit, i, own));
         if stronger.is_empty() {
             return noise;
         }
         let form = own - self.looks_like(fit, i, &stronger).unwrap_or(0.0);
-        noise.min(self.beside(fit, i, own)).min(form.max(0.0))
+        noise.min(form.max(0.0))
     }
 
-    /// What `nats` of the `i`-th member are worth beside another cause: with the over-dispersion of the
-    /// member's sizes on these drives alone.
-    fn beside(&self, fit: &Fit, member: usize, nats: f64) -> f64 {
+    /// What `nats` of the `i`-th member are worth with the over-dispersion of its sizes on these drives
+    /// themselves.
+    fn agreed(&self, fit: &Fit, member: usize, nats: f64) -> f64 {
         let freedom = self.drives() as f64 - 1.0 + DISPERSION_PRIOR;
         let sizes = CATALOGUE[fit.set[member]].sizes;
         let all = fit.free.iter().zip(self.dispersions(fit));
