@@ -10,7 +10,8 @@
 //! w_k ~ N(0, rho²)   of all drives together, B_k hat functions of a signal that drives the cause
 //! ```
 //! A wind has `w_k` of each drive for itself, over its time: weather swells and turns, and what blows
-//! aside of it goes with its whole length.
+//! aside of it goes with its whole length. So has what wanders within a drive (a steering that is off
+//! centre, a map that is shifted): a crosswind beside it would explain how it does.
 //!
 //! (Kennedy and O'Hagan, J. R. Statist. Soc. B 63, 2001; here multiplicative.) What another cause
 //! would patch of the form of a large one is explained without it, and a size is known no better
@@ -29,9 +30,9 @@ use crate::search::refit::Fit;
 
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
-/// Those of weather over the time of a drive: it changes within minutes (gusts of tens of seconds are
-/// noise, which drives in order have too).
-const OF_WEATHER: usize = 10;
+/// Those of weather and of what wanders, over the time of a drive: they change within minutes (gusts of
+/// tens of seconds are noise, which drives in order have too).
+const OF_DRIVE: usize = 10;
 
 /// Signals along which the course of a cause with this size may differ, those that drive it, and its
 /// standard deviation there.
@@ -50,12 +51,18 @@ fn rho(h: &Hypothesis, along: &Along) -> f64 {
         Along::Open(_) => form(h),
         Along::Fitted(_) => RHO,
         Along::Weather(_) => WEATHER,
+        Along::Wanders(_) => RHO_SHAPE,
     }
 }
 
 /// Is a size one of weather?
 fn weather(h: &Hypothesis) -> bool {
     h.course.iter().any(|along| matches!(along, Along::Weather(_)))
+}
+
+/// Has every drive a course of its own?
+fn of_drive(h: &Hypothesis) -> bool {
+    h.course.iter().any(Along::of_drive)
 }
 
 /// Random effects of one size: columns of a Gram matrix (the residual is column 0).
@@ -100,7 +107,7 @@ impl Course {
             }
             let Some(of) = CATALOGUE.iter().find(|h| h.sizes.contains(&p)) else { continue };
             let mut hats = Vec::new();
-            let count = if weather(of) { OF_WEATHER } else { HATS };
+            let count = if of_drive(of) { OF_DRIVE } else { HATS };
             for (name, rho) in signals(p) {
                 let Some(signal) = signal(name) else { continue };
                 let first = directions.len() + 1;
@@ -165,7 +172,7 @@ impl Course {
             for (rho, hats) in &e.hats {
                 let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
                 let part = (shows(e.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-                let to = if weather(e.of) { &mut between } else { &mut along };
+                let to = if of_drive(e.of) { &mut between } else { &mut along };
                 to.extend(hats.iter().map(|j| (*j, rho * size * part)));
             }
         }
@@ -282,7 +289,7 @@ mod tests {
         let sigma = course.deviations(directions.len(), &theta, &zero);
         assert_eq!(sigma[..2], [WEATHER * 5.0; 2]);
         assert_eq!(sigma[2], RHO * 0.1);
-        let hats = &sigma[3..3 + 2 * OF_WEATHER];
+        let hats = &sigma[3..3 + 2 * OF_DRIVE];
         assert!(hats.iter().all(|x| *x == WEATHER * 5.0), "{hats:?}");
     }
 
@@ -296,6 +303,7 @@ mod tests {
             let along: Vec<f64> = h.sizes.iter().flat_map(|p| signals(*p)).map(|s| s.1).collect();
             match law {
                 Law::Physics if weather(h) => assert_eq!(along[0], WEATHER, "{}", h.id),
+                Law::Physics if of_drive(h) => assert_eq!(along, [RHO_SHAPE], "{}", h.id),
                 Law::Physics => assert!(along.iter().all(|rho| *rho == RHO), "{}", h.id),
                 Law::Chosen => assert!(along.contains(&RHO_SHAPE), "{}", h.id),
             }

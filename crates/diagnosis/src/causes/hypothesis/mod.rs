@@ -44,14 +44,23 @@ pub(crate) enum Along {
     Fitted(&'static str),
     /// It is weather: of every drive for itself, it swells and turns.
     Weather(&'static str),
+    /// It wanders, of every drive for itself: nothing that is measured drives it.
+    Wanders(&'static str),
 }
 
 impl Along {
     /// The column.
     pub(crate) fn signal(&self) -> &'static str {
         match self {
-            Self::Open(name) | Self::Fitted(name) | Self::Weather(name) => name,
+            Self::Open(name) | Self::Fitted(name) | Self::Weather(name) | Self::Wanders(name) => {
+                name
+            }
         }
+    }
+
+    /// Every drive has a course of its own.
+    pub(crate) fn of_drive(&self) -> bool {
+        matches!(self, Self::Weather(_) | Self::Wanders(_))
     }
 }
 

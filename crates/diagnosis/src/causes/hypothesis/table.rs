@@ -1,7 +1,7 @@
 //! The table of hypotheses: which parameters, from which starts, with which channels and how small is
 //! not worth a word.
 
-use super::Along::{self, Fitted, Open, Weather};
+use super::Along::{self, Fitted, Open, Wanders, Weather};
 use super::{Hypothesis, Start};
 use crate::Channel as C;
 use crate::causes::param::P;
@@ -73,7 +73,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0)
         .along(&[Open("grade_frac")]),
     h("map_shift", &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0)
-        .along(&[Open("time_s")]),
+        .along(&[Wanders("time_s")]),
     h(
         "tyre_warmup",
         &[P::WarmupAmp],
@@ -222,12 +222,12 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.0008,
         0.0,
     )
-    .along(&[Open("time_s")]),
+    .along(&[Wanders("time_s")]),
     // Gear and linkage turn the wheels less about the middle than beyond, or more.
     h("steering_ratio", &[P::SteerRatio], &[], ONE, STEERING, 0.02, 0.0)
         .along(&[Open("steering_wheel_rad")]),
     h("steering_offset", &[P::SteerOffset], &[], ONE, STEERING, 0.015, 0.0)
-        .along(&[Open("time_s")]),
+        .along(&[Wanders("time_s")]),
     h(
         "steering_free_play",
         &[P::FreePlay],
