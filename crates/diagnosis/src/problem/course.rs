@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! r_d = theta S_d + theta u_d S_d + theta sum_k w_k (S_d o B_k) + ...
-//! u_d ~ N(0, tau²)   of each drive for itself
+//! u_d ~ N(0, rho²)   of each drive for itself
 //! w_k ~ N(0, rho²)   of all drives together, B_k hat functions of a signal that drives the cause
 //! ```
 //! A wind has `w_k` of each drive for itself, over its time: weather swells and turns, and what blows

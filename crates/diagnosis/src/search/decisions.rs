@@ -84,10 +84,11 @@ pub(crate) const OWN_SIZES_PART: f64 = 0.15;
 mod tests {
     /// They were about 120 once: whoever adds one looks for the term that the model lacks, or takes one out.
     #[test]
-    fn twenty_five_numbers_decide_and_each_says_its_unit() {
-        let text = include_str!("decisions.rs");
-        let count = text.lines().filter(|l| l.starts_with("pub(crate) const")).count();
-        assert_eq!(count, 25);
-        assert!(!text.contains("\n\npub(crate) const"), "a number without a word");
+    fn at_most_twenty_five_numbers_decide_and_each_says_what_it_is() {
+        let lines: Vec<&str> = include_str!("decisions.rs").lines().collect();
+        let is_number = |line: &str| line.starts_with("pub(crate) const");
+        let silent = lines.windows(2).find(|w| is_number(w[1]) && !w[0].starts_with("///"));
+        assert_eq!(silent, None);
+        assert!(lines.iter().filter(|line| is_number(line)).count() <= 25);
     }
 }

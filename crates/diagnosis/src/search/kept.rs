@@ -7,9 +7,10 @@ use crate::search::refit::Fit;
 impl dyn Evidence + '_ {
     /// The set without a cause, and the best set that the gate keeps of what the search finds among
     /// `open`. Where it refuses causes that explain as much as a verdict needs to be `unknown` (the gain
-    /// is of one drive, the others disagree), something is there all the same, and the cause that is to be named may be one that they outdid: the search begins anew without them, once
-    /// more than there may be causes at most. `bare` is the evidence of the best free function: where it wins
-    /// over what was found, it wins over what is found after that.
+    /// is of one drive, the others disagree), something is there all the same, and the cause that is to be
+    /// named may be one that they outdid: the search begins anew without them, once more than there may be
+    /// causes at most. `bare` is the evidence of the best free function: where it wins over what was found,
+    /// it wins over what is found after that.
     pub(crate) fn kept(
         &self,
         open: &[usize],

@@ -44,7 +44,10 @@ pub(crate) enum Along {
     Fitted(&'static str),
     /// It is weather: of every drive for itself, it swells and turns.
     Weather(&'static str),
-    /// It wanders, of every drive for itself: nothing that is measured drives it.
+    /// It wanders, of every drive for itself, as widely as an open law ([`RHO_SHAPE`]): nothing that is
+    /// measured drives it, and no data sheet says how far it goes.
+    ///
+    /// [`RHO_SHAPE`]: crate::search::decisions::RHO_SHAPE
     Wanders(&'static str),
 }
 
