@@ -1,10 +1,11 @@
 //! Hides effects in generated drives and counts what the diagnosis makes of them:
-//! `campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,channel] [only=cause]
-//! [from=CASE] [to=CASE] [cases=N,N,...] [dump=DIR] [family=1|2]`, KIND one of `clean`, `small`,
-//! `medium`, `large`, `pairs`, `outside`, `deleted`, `noise`. Two lines per case, one for people (`.` exact,
-//! `+` first right, `-` nothing, `X` wrong) and one of JSON, then the table. `family=2` takes shapes,
-//! driver, roads and noise that were written apart (`tests/support/second`). KIND `noise` says of the
-//! baseline how sums over rows scatter and how many drives show how much scatter about every cause.
+//! `campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [tolerance=F] [baseline_tolerance=F]
+//! [without=channel,channel] [only=cause] [from=CASE] [to=CASE] [cases=N,N,...] [dump=DIR]
+//! [family=1|2]`, KIND one of `clean`, `small`, `medium`, `large`, `pairs`, `outside`, `deleted`,
+//! `noise`. Two lines per case, one for people (`.` exact, `+` first right, `-` nothing, `X` wrong) and
+//! one of JSON, then the table. `family=2` takes shapes, driver, roads and noise that were written apart
+//! (`tests/support/second`). KIND `noise` says of the baseline how sums over rows scatter and how many
+//! drives show how much scatter about every cause.
 //! `campaign calibration FILE... [plot=PICTURE.svg]` pools the outputs of runs.
 #![expect(
     clippy::disallowed_macros,
@@ -36,7 +37,7 @@ use support::random::{between, sign};
 use support::second::outside::SECOND_OUTSIDE;
 use support::{Campaign, generate_apart, second};
 
-const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR] [family=1|2]\n       campaign calibration FILE... [plot=PICTURE.svg]";
+const USAGE: &str = "usage: campaign KIND COUNT SEED [drives=N] [held=N] [seconds=S] [tolerance=F] [baseline_tolerance=F] [without=channel,...] [only=cause] [from=CASE] [to=CASE] [cases=N,...] [dump=DIR] [family=1|2]\n       campaign calibration FILE... [plot=PICTURE.svg]";
 
 #[derive(Default)]
 struct Table {
@@ -366,6 +367,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if let Some(s) = option("seconds=") {
         campaign.duration_s = s.parse()?;
     }
+    // How far trucks in order differ from drive to drive, 1 as usual; the baseline's the same unless said.
+    if let Some(f) = option("tolerance=") {
+        campaign.tolerance = f.parse()?;
+    }
+    let baseline_tolerance =
+        option("baseline_tolerance=").map_or(Ok(campaign.tolerance), str::parse)?;
     let listed = |case: usize| {
         let case = case.to_string();
         option("cases=").is_none_or(|list| list.split(',').any(|c| c == case))
@@ -378,7 +385,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let (from, to) = (number("from=", 0)?, number("to=", usize::MAX)?);
     let plant = Plant::of_truck(&TruckParameters::load("reference")?)?;
-    let usual = Campaign { drives: 8, ..campaign };
+    let usual = Campaign { drives: 8, tolerance: baseline_tolerance, ..campaign };
     let clean = generate(&[], &usual, seed.wrapping_mul(7919) + 1);
     let baseline = Baseline::learn(&plant, &clean, &Serial)?;
     if kind == "noise" {
