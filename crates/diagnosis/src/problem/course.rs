@@ -9,6 +9,9 @@
 //! u_d ~ N(0, rho²)   of each drive for itself
 //! w_k ~ N(0, rho²)   of all drives together, B_k hat functions of a signal that drives the cause
 //! ```
+//! What is off along with a cause (more load lies somewhere) is another such effect of all drives, along
+//! the sensitivity of that parameter.
+//!
 //! A wind has `w_k` of each drive for itself, over its time: weather swells and turns, and what blows
 //! aside of it goes with its whole length. So has what wanders within a drive (a steering that is off
 //! centre, a map that is shifted): a crosswind beside it would explain how it does.
@@ -51,7 +54,7 @@ fn rho(h: &Hypothesis, along: &Along) -> f64 {
         Along::Open(_) => form(h),
         Along::Fitted(_) => RHO,
         Along::Weather(_) => WEATHER,
-        Along::Wanders(_) => RHO_SHAPE,
+        Along::Made(_) | Along::Wanders(_) => RHO_SHAPE,
     }
 }
 
@@ -75,6 +78,8 @@ struct Effect {
     column: usize,
     /// Its hats per signal, with the deviation of its course there.
     hats: Vec<(f64, Vec<usize>)>,
+    /// What is off along with it, with its deviation per unit of the size.
+    others: Vec<(f64, usize)>,
 }
 
 impl Effect {
@@ -117,7 +122,12 @@ impl Course {
                 }
                 hats.push((rho, (first..first + count).collect()));
             }
-            out.push(Effect { p, of, column: j + 1, hats });
+            let mut others = Vec::new();
+            for (other, per_unit) in of.along_with {
+                others.push((*per_unit, directions.len() + 1));
+                directions.push(Direction::new(*other, Vec::new(), other.spec().step));
+            }
+            out.push(Effect { p, of, column: j + 1, hats, others });
         }
         Self(out)
     }
@@ -128,6 +138,7 @@ impl Course {
         for e in &mut out.0 {
             e.column += more;
             e.hats.iter_mut().flat_map(|h| &mut h.1).for_each(|j| *j += more);
+            e.others.iter_mut().for_each(|o| o.1 += more);
         }
         out
     }
@@ -142,6 +153,7 @@ impl Course {
             for (rho, hats) in &e.hats {
                 hats.iter().for_each(|j| out[j - 1] = rho * size);
             }
+            e.others.iter().for_each(|(per_unit, j)| out[j - 1] = per_unit * size);
         }
         out
     }
@@ -175,6 +187,7 @@ impl Course {
                 let to = if of_drive(e.of) { &mut between } else { &mut along };
                 to.extend(hats.iter().map(|j| (*j, rho * size * part)));
             }
+            along.extend(e.others.iter().map(|(per_unit, j)| (*j, per_unit * size)));
         }
         gram.marginal(keep, &between, &along)
     }
@@ -293,6 +306,25 @@ mod tests {
         assert!(hats.iter().all(|x| *x == WEATHER * 5.0), "{hats:?}");
     }
 
+    /// A truck that was 14 % heavier than its load sheet, with what was loaded beyond it 1.2 m behind the
+    /// rest, was told to have its payload 0.2 m too far back as well.
+    #[test]
+    fn more_load_than_the_sheet_says_lies_somewhere() {
+        let zero = [0.0; crate::causes::param::PARAMS];
+        let mut theta = zero;
+        theta[P::Mass as usize] = -0.25;
+        let mut directions = directions(&[P::Mass], &theta);
+        let course = Course::of(&[P::Mass], &mut directions);
+        let last = directions.last().unwrap();
+        assert!(last.p == P::PayloadX && last.hat.is_none());
+        let per_unit = CATALOGUE.iter().find(|h| h.id == "mass").unwrap().along_with[0].1;
+        let sigma = course.deviations(directions.len(), &theta, &zero);
+        assert_eq!(*sigma.last().unwrap(), per_unit * 0.25);
+        // nothing without mass
+        let sigma = course.deviations(directions.len(), &zero, &zero);
+        assert_eq!(*sigma.last().unwrap(), 0.0);
+    }
+
     /// The truck model's catalogue says who gives a cause's law; the courses follow it, but for the
     /// signals over which a form is fitted.
     #[test]
@@ -304,7 +336,11 @@ mod tests {
             match law {
                 Law::Physics if weather(h) => assert_eq!(along[0], WEATHER, "{}", h.id),
                 Law::Physics if of_drive(h) => assert_eq!(along, [RHO_SHAPE], "{}", h.id),
-                Law::Physics => assert!(along.iter().all(|rho| *rho == RHO), "{}", h.id),
+                Law::Physics => {
+                    let made = h.course.iter().filter(|a| matches!(a, Along::Made(_))).count();
+                    let wide = along.iter().filter(|rho| **rho != RHO).count();
+                    assert_eq!(wide, made, "{}", h.id);
+                }
                 Law::Chosen => assert!(along.contains(&RHO_SHAPE), "{}", h.id),
             }
             broad += usize::from(law == Law::Chosen);

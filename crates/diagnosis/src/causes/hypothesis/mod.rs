@@ -32,6 +32,9 @@ pub(crate) struct Hypothesis {
     /// What its course may differ along from the catalogue's: signals that drive it, but not the law
     /// that tells it from others.
     pub(crate) course: &'static [Along],
+    /// What is off along with it on all drives, and how far: standard deviation in that parameter's unit
+    /// per unit of the size.
+    pub(crate) along_with: &'static [(P, f64)],
 }
 
 /// A measured signal along which the course of a cause may differ from the catalogue's.
@@ -39,6 +42,10 @@ pub(crate) struct Hypothesis {
 pub(crate) enum Along {
     /// As widely as its law is open.
     Open(&'static str),
+    /// As widely as what a maker chose ([`RHO_SHAPE`]), though the rest of its law is physics.
+    ///
+    /// [`RHO_SHAPE`]: crate::search::decisions::RHO_SHAPE
+    Made(&'static str),
     /// Its form is fitted over it (onset and slope, threshold and hysteresis, knee): with a wide course
     /// beside it the two would be free of each other.
     Fitted(&'static str),
@@ -55,9 +62,11 @@ impl Along {
     /// The column.
     pub(crate) fn signal(&self) -> &'static str {
         match self {
-            Self::Open(name) | Self::Fitted(name) | Self::Weather(name) | Self::Wanders(name) => {
-                name
-            }
+            Self::Open(name)
+            | Self::Made(name)
+            | Self::Fitted(name)
+            | Self::Weather(name)
+            | Self::Wanders(name) => name,
         }
     }
 

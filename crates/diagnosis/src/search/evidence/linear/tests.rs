@@ -47,39 +47,39 @@ fn found(problem: &LinearProblem, ids: &[&str]) -> (Vec<&'static str>, Fit, Fit)
     (names, fit, empty)
 }
 
-const ROLLING: &str = "rolling_resistance";
 const DRAG: &str = "air_drag";
+const MASS: &str = "mass";
 
 /// A cause of one prior deviation leaves this many nats' worth of squares in each of six drives.
 const STRONG: f64 = 40.0;
 
 #[test]
 fn nothing_is_found_where_nothing_is() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG)), (P::Mass, times(&wave(2), STRONG))];
     let noise = times(&plus(&wave(7), &wave(9)), 4.0);
-    assert!(found(&alike(6, &noise, &columns), &[ROLLING, DRAG]).0.is_empty());
+    assert!(found(&alike(6, &noise, &columns), &[DRAG, MASS]).0.is_empty());
 }
 
 #[test]
 fn orthogonal_causes_are_both_found_with_their_sizes() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG)), (P::Mass, times(&wave(2), STRONG))];
     let residual = plus(&times(&columns[0].1, 0.3), &times(&columns[1].1, -0.2));
-    let (mut names, fit, _) = found(&alike(6, &residual, &columns), &[ROLLING, DRAG]);
+    let (mut names, fit, _) = found(&alike(6, &residual, &columns), &[DRAG, MASS]);
     names.sort_unstable();
-    assert_eq!(names, [DRAG, ROLLING]);
-    assert!((fit.theta[P::Rolling as usize] - 0.3).abs() < 0.01);
-    assert!((fit.theta[P::Drag as usize] + 0.2).abs() < 0.01);
+    assert_eq!(names, [DRAG, MASS]);
+    assert!((fit.theta[P::Drag as usize] - 0.3).abs() < 0.01);
+    assert!((fit.theta[P::Mass as usize] + 0.2).abs() < 0.01);
 }
 
 #[test]
 fn of_a_collinear_pair_one_is_found_and_the_other_says_as_much() {
     let (one, other) = (wave(1), plus(&times(&wave(1), 0.998), &times(&wave(2), 0.06)));
-    let columns = [(P::Rolling, times(&one, STRONG)), (P::Drag, times(&other, STRONG))];
+    let columns = [(P::Drag, times(&one, STRONG)), (P::Mass, times(&other, STRONG))];
     let problem = alike(6, &times(&one, 0.15 * STRONG), &columns);
-    let (names, fit, empty) = found(&problem, &[ROLLING, DRAG]);
+    let (names, fit, empty) = found(&problem, &[DRAG, MASS]);
     assert_eq!(names.len(), 1, "{names:?}");
     let evidence: &dyn Evidence = &problem;
-    let rival = if names[0] == ROLLING { DRAG } else { ROLLING };
+    let rival = if names[0] == DRAG { MASS } else { DRAG };
     let screen = evidence.screen(&empty, &[LinearProblem::cause(rival)]);
     let gain = screen.singles(None)[0].gain;
     assert!((fit.log_z - gain).abs() < 3.0, "{} {gain}", fit.log_z);
@@ -89,12 +89,12 @@ fn of_a_collinear_pair_one_is_found_and_the_other_says_as_much() {
 /// a function won over all of them.
 #[test]
 fn the_search_ends_where_a_function_wins_over_whatever_may_follow() {
-    let columns = [(P::Rolling, 1, 0.4), (P::Drag, 2, 0.2), (P::Mass, 3, 0.1)]
+    let columns = [(P::Drag, 1, 0.4), (P::Mass, 2, 0.2), (P::Rolling, 3, 0.1)]
         .map(|(p, k, size)| ((p, times(&wave(k), STRONG)), size));
     let residual = columns.iter().map(|((_, x), size)| times(x, *size));
     let residual = residual.reduce(|a, b| plus(&a, &b)).unwrap();
     let problem = alike(6, &residual, &columns.map(|x| x.0));
-    let open = [ROLLING, DRAG, "mass"].map(LinearProblem::cause);
+    let open = [DRAG, MASS, "rolling_resistance"].map(LinearProblem::cause);
     let evidence: &dyn Evidence = &problem;
     let found = |bare| evidence.search(&open, 4, bare, &mut |_| {}).unwrap().1;
     let all = found(0.0);
@@ -109,8 +109,8 @@ fn the_search_ends_where_a_function_wins_over_whatever_may_follow() {
 fn two_causes_that_say_little_are_no_more_found_than_one() {
     let near =
         |sign: f64| plus(&times(&wave(1), 0.995 * STRONG), &times(&wave(2), sign * 0.1 * STRONG));
-    let columns = [(P::Rolling, near(1.0)), (P::Drag, near(-1.0))];
-    let open = [ROLLING, DRAG].map(LinearProblem::cause);
+    let columns = [(P::Drag, near(1.0)), (P::Mass, near(-1.0))];
+    let open = [DRAG, MASS].map(LinearProblem::cause);
     let of = |residual: f64| {
         let problem = alike(6, &times(&wave(2), residual), &columns);
         let evidence: &dyn Evidence = &problem;
@@ -126,10 +126,10 @@ fn two_causes_that_say_little_are_no_more_found_than_one() {
 
 #[test]
 fn a_fit_that_would_not_say_enough_is_given_up() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG))];
     let problem = alike(6, &times(&columns[0].1, 0.3), &columns);
     let evidence: &dyn Evidence = &problem;
-    let (set, zero) = ([LinearProblem::cause(ROLLING)], *evidence.zero());
+    let (set, zero) = ([LinearProblem::cause(DRAG)], *evidence.zero());
     let norm = evidence.gram(&zero, &[]).sum(|_| true).2;
     let fit = evidence.fit(&set, &zero, norm).unwrap();
     let beyond = |least| evidence.fit_beyond(&set, &zero, norm, &mut Beyond::evidence(least));
@@ -141,15 +141,15 @@ fn a_fit_that_would_not_say_enough_is_given_up() {
 /// A wind was fitted from five sides to the end, though most of them led to the same place.
 #[test]
 fn a_fit_from_another_side_ends_where_it_comes_to_where_one_has_ended() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG)), (P::Mass, times(&wave(2), STRONG))];
     let residual = plus(&times(&columns[0].1, 0.3), &times(&columns[1].1, 0.1));
     let problem = alike(6, &residual, &columns);
     let evidence: &dyn Evidence = &problem;
-    let (set, zero) = ([LinearProblem::cause(ROLLING)], *evidence.zero());
+    let (set, zero) = ([LinearProblem::cause(DRAG)], *evidence.zero());
     let norm = evidence.gram(&zero, &[]).sum(|_| true).2;
     let from = |start, beyond: &mut _| evidence.fit_beyond(&set, start, norm, beyond);
     let mut other_side = zero;
-    other_side[P::Rolling as usize] = 0.5;
+    other_side[P::Drag as usize] = 0.5;
     // Nothing has to be beaten in any of these but the place.
     let nothing = || Beyond::evidence(f64::NEG_INFINITY);
     assert!(from(&other_side, &mut nothing()).is_some());
@@ -159,7 +159,7 @@ fn a_fit_from_another_side_ends_where_it_comes_to_where_one_has_ended() {
     assert!(from(&other_side, &mut known).is_none());
     // The same size beside another figure that the fit holds is another place, and a better one.
     let mut elsewhere = other_side;
-    elsewhere[P::Drag as usize] = 0.1;
+    elsewhere[P::Mass as usize] = 0.1;
     assert!(from(&elsewhere, &mut known).is_some());
 }
 
@@ -174,12 +174,12 @@ fn growing(x: &[f64]) -> Vec<f64> {
 #[test]
 fn a_helper_that_patches_the_form_of_a_large_cause_is_not_taken() {
     let (one, patch) = (wave(1), growing(&wave(1)));
-    let columns = [(P::Rolling, times(&one, 800.0)), (P::Drag, times(&patch, 200.0))];
+    let columns = [(P::Drag, times(&one, 800.0)), (P::Mass, times(&patch, 200.0))];
     let course = plus(&columns[0].1, &times(&patch, 0.05 * 800.0));
     let problem = alike(6, &times(&course, 0.4), &columns);
-    let (names, fit, _) = found(&problem, &[ROLLING, DRAG]);
-    assert_eq!(names, [ROLLING]);
-    assert!((fit.theta[P::Rolling as usize] - 0.4).abs() < 0.01);
+    let (names, fit, _) = found(&problem, &[DRAG, MASS]);
+    assert_eq!(names, [DRAG]);
+    assert!((fit.theta[P::Drag as usize] - 0.4).abs() < 0.01);
     let patched =
         0.5 * 6.0 * (0.4 * 0.05 * 800.0_f64).powi(2) * patch.iter().map(|x| x * x).sum::<f64>();
     assert!(patched > 200.0, "{patched}");
@@ -189,20 +189,20 @@ fn a_helper_that_patches_the_form_of_a_large_cause_is_not_taken() {
 /// of the large one is asked of it, for it does what no course of the large one does.
 #[test]
 fn a_small_cause_beside_a_very_strong_one_is_found() {
-    let columns = [(P::Rolling, times(&wave(1), 4000.0)), (P::Drag, times(&wave(2), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), 4000.0)), (P::Mass, times(&wave(2), STRONG))];
     let residual = plus(&times(&columns[0].1, 0.4), &times(&columns[1].1, 0.2));
-    let (mut names, fit, empty) = found(&alike(6, &residual, &columns), &[ROLLING, DRAG]);
+    let (mut names, fit, empty) = found(&alike(6, &residual, &columns), &[DRAG, MASS]);
     assert!(fit.log_z - empty.log_z > 1e6);
     names.sort_unstable();
-    assert_eq!(names, [DRAG, ROLLING]);
+    assert_eq!(names, [DRAG, MASS]);
 }
 
 /// What drives in plenty say about a size is no better than the form of the cause.
 #[test]
 fn a_size_is_known_no_better_than_the_form_of_its_cause() {
     let sigma = |strength: f64| {
-        let columns = [(P::Rolling, times(&wave(1), strength))];
-        let (_, fit, _) = found(&alike(6, &times(&columns[0].1, 0.4), &columns), &[ROLLING]);
+        let columns = [(P::Drag, times(&wave(1), strength))];
+        let (_, fit, _) = found(&alike(6, &times(&columns[0].1, 0.4), &columns), &[DRAG]);
         fit.covariance[(0, 0)].sqrt()
     };
     assert!(sigma(4000.0) > 0.02 * 0.4, "{}", sigma(4000.0));
@@ -223,34 +223,34 @@ fn the_wind_of_one_stormy_drive_is_no_cause() {
 /// What follows no cause at all costs the cause beside it nothing, and names none.
 #[test]
 fn an_unknown_beside_a_cause_leaves_the_cause_alone() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG)), (P::Mass, times(&wave(2), STRONG))];
     let unknown = times(&wave(11), 30.0);
     let residual = plus(&times(&columns[0].1, 0.3), &unknown);
-    let (names, fit, _) = found(&alike(6, &residual, &columns), &[ROLLING, DRAG]);
-    assert_eq!(names, [ROLLING]);
-    assert!((fit.theta[P::Rolling as usize] - 0.3).abs() < 0.01);
-    assert!(found(&alike(6, &unknown, &columns), &[ROLLING, DRAG]).0.is_empty());
+    let (names, fit, _) = found(&alike(6, &residual, &columns), &[DRAG, MASS]);
+    assert_eq!(names, [DRAG]);
+    assert!((fit.theta[P::Drag as usize] - 0.3).abs() < 0.01);
+    assert!(found(&alike(6, &unknown, &columns), &[DRAG, MASS]).0.is_empty());
 }
 
 #[test]
 fn a_tolerance_that_does_the_same_takes_the_cause_away() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG))];
     let residual = times(&columns[0].1, 0.1);
-    assert_eq!(found(&alike(6, &residual, &columns), &[ROLLING]).0, [ROLLING]);
+    assert_eq!(found(&alike(6, &residual, &columns), &[DRAG]).0, [DRAG]);
     let mut problem = alike(6, &residual, &columns);
     for d in &mut problem.drives {
         d.tolerances = vec![times(&wave(1), STRONG)];
     }
-    assert!(found(&problem, &[ROLLING]).0.is_empty());
+    assert!(found(&problem, &[DRAG]).0.is_empty());
 }
 
 #[test]
 fn drives_held_out_confirm_a_cause_doubt_it_or_take_it_away() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG))];
     let of = |count, size: f64| alike(count, &times(&columns[0].1, size), &columns);
     let learned = of(6, 0.1);
-    let (names, fit, empty) = found(&learned, &[ROLLING]);
-    assert_eq!(names, [ROLLING]);
+    let (names, fit, empty) = found(&learned, &[DRAG]);
+    assert_eq!(names, [DRAG]);
     let evidence: &dyn Evidence = &learned;
     let revised = |held: f64| {
         let r = evidence.revise(&of(2, held), fit.clone(), &empty);
@@ -294,19 +294,19 @@ fn what_wanders_does_so_of_every_drive_for_itself() {
 /// Five drives ask for 0.2, one for 0.5: each says so, with what it knows.
 #[test]
 fn every_drive_says_which_size_it_alone_would_choose() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG))];
     let mut problem = alike(6, &times(&columns[0].1, 0.2), &columns);
     problem.drives[3].residual = times(&columns[0].1, 0.5);
     let evidence: &dyn Evidence = &problem;
-    let set = [LinearProblem::cause(ROLLING)];
+    let set = [LinearProblem::cause(DRAG)];
     let fit = evidence.fit(&set, evidence.zero(), 0.0).unwrap();
     let alone = evidence.alone(&fit);
     assert_eq!(alone.len(), 6);
     // What the drive knows, and what the cause may scatter between drives.
-    let sigma = STRONG.recip().hypot(RHO * fit.theta[P::Rolling as usize]);
+    let sigma = STRONG.recip().hypot(RHO * fit.theta[P::Drag as usize]);
     for (i, sizes) in alone.iter().enumerate() {
         let expected = if i == 3 { 1.5 } else { 1.2 };
-        assert_eq!((sizes[0].id, sizes[0].parameter), (ROLLING, "coefficient_scale"));
+        assert_eq!((sizes[0].id, sizes[0].parameter), (DRAG, "cd_a_scale"));
         assert!((sizes[0].value - expected).abs() < 0.01, "{i}: {sizes:?}");
         assert!((sizes[0].sigma / sigma - 1.0).abs() < 0.01, "{i}: {sizes:?}");
     }
@@ -316,13 +316,13 @@ fn every_drive_says_which_size_it_alone_would_choose() {
 /// worth less than it says, and what they contradict each other about still less.
 #[test]
 fn a_cause_is_worth_what_few_drives_can_say() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG)), (P::Drag, times(&wave(2), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG)), (P::Mass, times(&wave(2), STRONG))];
     let worth = |sizes: [f64; 6]| {
         let of = |x: &f64| plus(&times(&columns[0].1, 0.3), &times(&columns[1].1, *x));
         let drives = sizes.iter().map(|x| drive(of(x), &columns)).collect();
         let problem = LinearProblem::new(drives);
         let evidence: &dyn Evidence = &problem;
-        let set = [ROLLING, DRAG].map(LinearProblem::cause);
+        let set = [DRAG, MASS].map(LinearProblem::cause);
         let zero = [0.0; PARAMS];
         let norm = evidence.gram(&zero, &[]).total().2;
         let both = evidence.fit(&set, &zero, norm).unwrap();
@@ -376,13 +376,13 @@ fn what_the_form_of_a_stronger_cause_may_look_like_is_worth_little() {
 /// by how much, and evidence counts for less by that, of a lone cause too.
 #[test]
 fn what_drives_in_order_scatter_about_a_cause_takes_from_its_evidence() {
-    let columns = [(P::Rolling, times(&wave(1), STRONG))];
+    let columns = [(P::Drag, times(&wave(1), STRONG))];
     let scattered = |by: f64| {
         let pushes = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
         let of = |push: &f64| drive(times(&wave(1), by * push), &columns);
         let problem = LinearProblem::new(pushes.iter().map(of).collect());
         let evidence: &dyn Evidence = &problem;
-        evidence.scatter_in_order()[LinearProblem::cause(ROLLING)]
+        evidence.scatter_in_order()[LinearProblem::cause(DRAG)]
     };
     // Eight drives against four drives' worth of what is expected.
     assert!((scattered(1.0).ratio - 1.0).abs() < 1e-9);
@@ -392,7 +392,7 @@ fn what_drives_in_order_scatter_about_a_cause_takes_from_its_evidence() {
     let mut problem = alike(6, &times(&columns[0].1, 0.1), &columns);
     problem.scatter = more;
     let evidence: &dyn Evidence = &problem;
-    let (_, fit, _) = found(&problem, &[ROLLING]);
+    let (_, fit, _) = found(&problem, &[DRAG]);
     // Student's t of twelve degrees of freedom, three times as scattered
     let worth = 6.0 * (1.0_f64 + 84.0 / 36.0).ln();
     assert!((evidence.worth(&fit, 0, &[42.0]) - worth).abs() < 1e-9);
