@@ -315,11 +315,15 @@ mod tests {
         theta[P::Mass as usize] = -0.25;
         let mut directions = directions(&[P::Mass], &theta);
         let course = Course::of(&[P::Mass], &mut directions);
-        let last = directions.last().unwrap();
-        assert!(last.p == P::PayloadX && last.hat.is_none());
-        let per_unit = CATALOGUE.iter().find(|h| h.id == "mass").unwrap().along_with[0].1;
+        let along_with = CATALOGUE.iter().find(|h| h.id == "mass").unwrap().along_with;
+        let others = directions.len() - along_with.len();
         let sigma = course.deviations(directions.len(), &theta, &zero);
-        assert_eq!(*sigma.last().unwrap(), per_unit * 0.25);
+        for (i, (p, per_unit)) in along_with.iter().enumerate() {
+            let last = &directions[others + i];
+            assert!(last.p == *p && last.hat.is_none());
+            assert_eq!(sigma[others + i], per_unit * 0.25);
+        }
+        assert!(along_with.iter().any(|(p, _)| *p == P::PayloadX));
         // nothing without mass
         let sigma = course.deviations(directions.len(), &zero, &zero);
         assert_eq!(*sigma.last().unwrap(), 0.0);

@@ -33,6 +33,9 @@ const RATES: &[Start] = &[[0.0, 0.0], [1.0, 0.0]];
 /// may lie a metre from where the rest does, which is what load plans leave a full semitrailer (VDI
 /// 2700-4), and of 40 t in motion 25 t are payload.
 const LOADED_ELSEWHERE_M: f64 = 1.6;
+/// The same for the payload's squared radius of gyration, 1 per unit of the train's mass: what lies
+/// anywhere on a box has a squared distance that scatters by 0.9 of its mean (4 / sqrt(20)).
+const LOADED_APART: f64 = 1.4;
 
 /// The force balance with one more channel.
 const fn with(channel: C) -> [C; 5] {
@@ -81,7 +84,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     .along(&[Weather("time_s")]),
     h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0)
         .along(&[Open("grade_frac"), Open("accel_y_m_s2")])
-        .with(&[(P::PayloadX, LOADED_ELSEWHERE_M)]),
+        .with(&[(P::PayloadX, LOADED_ELSEWHERE_M), (P::PayloadSpread, LOADED_APART)]),
     h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0)
         .along(&[Open("grade_frac")]),
     h("map_shift", &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0)
