@@ -50,6 +50,8 @@ struct Table {
     silent: usize,
     unseen: usize,
     wrong: usize,
+    /// Stated as the explanation, with a cause that was not hidden among those named.
+    helped: usize,
     unknown: usize,
     signal: usize,
     unsure: usize,
@@ -209,6 +211,9 @@ impl Table {
         self.wrong += usize::from(
             d.verdict == Verdict::Explained && named.first().is_some_and(|n| !truth.contains(n)),
         );
+        self.helped += usize::from(
+            d.verdict == Verdict::Explained && named.iter().any(|n| !truth.contains(n)),
+        );
         self.unknown += usize::from(d.verdict == Verdict::Unknown);
         self.unsure += usize::from(d.verdict != Verdict::Explained);
         let counts = match hidden.first() {
@@ -273,7 +278,11 @@ impl Table {
             of(self.signal)
         );
         println!("not stated as sure  {}", of(self.unsure));
-        println!("confident and wrong {}", of(self.wrong));
+        println!(
+            "confident and wrong {}, in a cause beside it {}",
+            of(self.wrong),
+            of(self.helped)
+        );
         println!("90 % intervals that cover {} of {}", self.covered, self.intervals);
         println!(
             "extension withheld, not significant on held-out drives {} of {}",
@@ -367,7 +376,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if let Some(s) = option("seconds=") {
         campaign.duration_s = s.parse()?;
     }
-    // How far trucks in order differ from drive to drive, 1 as usual; the baseline's the same unless said.
+    // How far trucks in order differ from drive to drive, 1 as usual; those of the baseline, too, unless
+    // said.
     if let Some(f) = option("tolerance=") {
         campaign.tolerance = f.parse()?;
     }

@@ -9,8 +9,8 @@
 //! u_d ~ N(0, rho²)   of each drive for itself
 //! w_k ~ N(0, rho²)   of all drives together, B_k hat functions of a signal that drives the cause
 //! ```
-//! What is off along with a cause (more load lies somewhere) is another such effect of all drives, along
-//! the sensitivity of that parameter.
+//! What a cause brings along (more load lies somewhere) is another such effect of all drives, along the
+//! sensitivity of that parameter.
 //!
 //! A wind has `w_k` of each drive for itself, over its time: weather swells and turns, and what blows
 //! aside of it goes with its whole length. So has what wanders within a drive (a steering that is off
@@ -20,9 +20,6 @@
 //! would patch of the form of a large one is explained without it, and a size is known no better
 //! than its form.
 
-use dynamics::catalogue::Law;
-use nalgebra::{DMatrix, DVector};
-
 use crate::causes::hypothesis::{Along, CATALOGUE, Hypothesis};
 use crate::causes::param::{P, Theta};
 use crate::problem::{Direction, Gram, Hat};
@@ -30,6 +27,7 @@ use crate::replay::signal::signal;
 use crate::search::decisions::{RHO, RHO_SHAPE, WEATHER};
 use crate::search::free::directions;
 use crate::search::refit::Fit;
+use dynamics::catalogue::Law;
 
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
@@ -78,8 +76,8 @@ struct Effect {
     column: usize,
     /// Its hats per signal, with the deviation of its course there.
     hats: Vec<(f64, Vec<usize>)>,
-    /// What is off along with it, with its deviation per unit of the size.
-    others: Vec<(f64, usize)>,
+    /// What it brings along, with its deviation per unit of the size.
+    brings: Vec<(f64, usize)>,
 }
 
 impl Effect {
@@ -122,12 +120,12 @@ impl Course {
                 }
                 hats.push((rho, (first..first + count).collect()));
             }
-            let mut others = Vec::new();
-            for (other, per_unit) in of.along_with {
-                others.push((*per_unit, directions.len() + 1));
-                directions.push(Direction::new(*other, Vec::new(), other.spec().step));
+            let mut brings = Vec::new();
+            for (brought, per_unit) in of.brings {
+                brings.push((*per_unit, directions.len() + 1));
+                directions.push(Direction::new(*brought, Vec::new(), brought.spec().step));
             }
-            out.push(Effect { p, of, column: j + 1, hats, others });
+            out.push(Effect { p, of, column: j + 1, hats, brings });
         }
         Self(out)
     }
@@ -138,7 +136,7 @@ impl Course {
         for e in &mut out.0 {
             e.column += more;
             e.hats.iter_mut().flat_map(|h| &mut h.1).for_each(|j| *j += more);
-            e.others.iter_mut().for_each(|o| o.1 += more);
+            e.brings.iter_mut().for_each(|b| b.1 += more);
         }
         out
     }
@@ -153,7 +151,7 @@ impl Course {
             for (rho, hats) in &e.hats {
                 hats.iter().for_each(|j| out[j - 1] = rho * size);
             }
-            e.others.iter().for_each(|(per_unit, j)| out[j - 1] = per_unit * size);
+            e.brings.iter().for_each(|(per_unit, j)| out[j - 1] = per_unit * size);
         }
         out
     }
@@ -187,7 +185,7 @@ impl Course {
                 let to = if of_drive(e.of) { &mut between } else { &mut along };
                 to.extend(hats.iter().map(|j| (*j, rho * size * part)));
             }
-            along.extend(e.others.iter().map(|(per_unit, j)| (*j, per_unit * size)));
+            along.extend(e.brings.iter().map(|(per_unit, j)| (*j, per_unit * size)));
         }
         gram.marginal(keep, &between, &along)
     }
@@ -214,76 +212,6 @@ impl Point {
     }
 }
 
-impl Gram {
-    /// The same over the columns `keep`, with random effects taken out: columns that every drive has
-    /// for itself and columns that all share, each with its standard deviation.
-    fn marginal(
-        &self,
-        keep: &[usize],
-        between: &[(usize, f64)],
-        along: &[(usize, f64)],
-    ) -> Option<Self> {
-        let (u, w) = (between.len(), along.len());
-        let n = self.per_drive.first()?.nrows();
-        let q = self.own.first().map_or(0, DMatrix::nrows);
-        let mut out = Self {
-            per_drive: Vec::new(),
-            common: Vec::new(),
-            own: std::sync::Arc::default(),
-            log_det: 0.0,
-        };
-        let (mut owns, mut all, mut before) =
-            (Vec::new(), DMatrix::identity(q + w, q + w), DMatrix::identity(q, q));
-        for (i, g) in self.per_drive.iter().enumerate() {
-            let empty = DMatrix::zeros(0, n);
-            let (c, own) = match (self.common.get(i), self.own.get(i)) {
-                (Some(c), Some(own)) => (c, own.clone()),
-                _ => (&empty, DMatrix::zeros(0, 0)),
-            };
-            before += &own;
-            let columns = |x: &DMatrix<f64>, of: &[(usize, f64)]| {
-                DMatrix::from_fn(x.nrows(), of.len(), |r, j| x[(r, of[j].0)] * of[j].1)
-            };
-            let (gu, cu) = (columns(g, between), columns(c, between));
-            let inner = DMatrix::from_fn(u, u, |a, b| {
-                between[a].1 * gu[(between[a].0, b)] + if a == b { 1.0 } else { 0.0 }
-            });
-            let factor = inner.cholesky()?;
-            out.log_det += 2.0 * factor.l().diagonal().iter().map(|x| x.ln()).sum::<f64>();
-            let g = g - &gu * factor.solve(&gu.transpose());
-            let c = c - &cu * factor.solve(&gu.transpose());
-            let own = own - &cu * factor.solve(&cu.transpose());
-            let (gw, cw) = (columns(&g, along), columns(&c, along));
-            let common = DMatrix::from_fn(q + w, keep.len(), |r, j| {
-                if r < q { c[(r, keep[j])] } else { gw[(keep[j], r - q)] }
-            });
-            let mut wide = DMatrix::zeros(q + w, q + w);
-            wide.view_mut((0, 0), (q, q)).copy_from(&own);
-            wide.view_mut((0, q), (q, w)).copy_from(&cw);
-            wide.view_mut((q, 0), (w, q)).copy_from(&cw.transpose());
-            let ww = DMatrix::from_fn(w, w, |a, b| along[a].1 * gw[(along[a].0, b)]);
-            wide.view_mut((q, q), (w, w)).copy_from(&ww);
-            all += &wide;
-            owns.push(wide);
-            out.common.push(common);
-            out.per_drive.push(crate::problem::stats::evidence::sub(&g, keep));
-        }
-        let log_det = |m: DMatrix<f64>| -> Option<f64> {
-            Some(2.0 * m.cholesky()?.l().diagonal().iter().map(|x| x.ln()).sum::<f64>())
-        };
-        out.log_det += log_det(all)? - log_det(before)?;
-        out.own = std::sync::Arc::new(owns);
-        Some(out)
-    }
-
-    /// Information and gradient over all drives, and what the residual costs: its squared length and
-    /// the logarithm of the determinant of the random effects.
-    pub(crate) fn total(&self) -> (DMatrix<f64>, DVector<f64>, f64) {
-        let (a, b, norm) = self.sum(|_| true);
-        (a, b, norm + self.log_det)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -304,29 +232,6 @@ mod tests {
         assert_eq!(sigma[2], RHO * 0.1);
         let hats = &sigma[3..3 + 2 * OF_DRIVE];
         assert!(hats.iter().all(|x| *x == WEATHER * 5.0), "{hats:?}");
-    }
-
-    /// A truck that was 14 % heavier than its load sheet, with what was loaded beyond it 1.2 m behind the
-    /// rest, was told to have its payload 0.2 m too far back as well.
-    #[test]
-    fn more_load_than_the_sheet_says_lies_somewhere() {
-        let zero = [0.0; crate::causes::param::PARAMS];
-        let mut theta = zero;
-        theta[P::Mass as usize] = -0.25;
-        let mut directions = directions(&[P::Mass], &theta);
-        let course = Course::of(&[P::Mass], &mut directions);
-        let along_with = CATALOGUE.iter().find(|h| h.id == "mass").unwrap().along_with;
-        let others = directions.len() - along_with.len();
-        let sigma = course.deviations(directions.len(), &theta, &zero);
-        for (i, (p, per_unit)) in along_with.iter().enumerate() {
-            let last = &directions[others + i];
-            assert!(last.p == *p && last.hat.is_none());
-            assert_eq!(sigma[others + i], per_unit * 0.25);
-        }
-        assert!(along_with.iter().any(|(p, _)| *p == P::PayloadX));
-        // nothing without mass
-        let sigma = course.deviations(directions.len(), &zero, &zero);
-        assert_eq!(*sigma.last().unwrap(), 0.0);
     }
 
     /// The truck model's catalogue says who gives a cause's law; the courses follow it, but for the

@@ -14,6 +14,7 @@ mod means;
 mod moved;
 pub(crate) mod noise;
 mod nuisance;
+mod random;
 mod signals;
 pub(crate) mod stats;
 

@@ -32,9 +32,9 @@ pub(crate) struct Hypothesis {
     /// What its course may differ along from the catalogue's: signals that drive it, but not the law
     /// that tells it from others.
     pub(crate) course: &'static [Along],
-    /// What is off along with it on all drives, and how far: standard deviation in that parameter's unit
-    /// per unit of the size.
-    pub(crate) along_with: &'static [(P, f64)],
+    /// What it brings along, the same on all drives, and how far that is off: standard deviation in that
+    /// parameter's unit per unit of the size.
+    pub(crate) brings: &'static [(P, f64)],
 }
 
 /// A measured signal along which the course of a cause may differ from the catalogue's.

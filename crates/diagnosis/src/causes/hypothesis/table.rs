@@ -29,13 +29,14 @@ const LATE_OR_SLOW: &[Start] = &[[0.0, 0.0], [0.7, 0.0]];
 /// A meter of a rate may be off by a factor, or more the higher the rate.
 const RATES: &[Start] = &[[0.0, 0.0], [1.0, 0.0]];
 
-/// How far a load that no sheet knows moves the centre of the whole, m per unit of the train's mass. It
-/// may lie a metre from where the rest does, which is what load plans leave a full semitrailer (VDI
-/// 2700-4), and of 40 t in motion 25 t are payload.
-const LOADED_ELSEWHERE_M: f64 = 1.6;
-/// The same for the payload's squared radius of gyration, 1 per unit of the train's mass: what lies
-/// anywhere on a box has a squared distance that scatters by 0.9 of its mean (4 / sqrt(20)).
-const LOADED_APART: f64 = 1.4;
+/// Mass of a laden train over that of its payload, 1: 40 t of which 25 t are payload.
+const TRAIN_OVER_PAYLOAD: f64 = 1.6;
+/// How far load that no sheet knows lies from the rest, m. A judgement: plans of load distribution (VDI
+/// 2700-4) bound the place of a full load by the axles, of a light one hardly.
+const LIES_ELSEWHERE_M: f64 = 1.0;
+/// How far its squared distance from the middle differs from the payload's squared radius of gyration, in
+/// that: `3 u²` of places `u` anywhere between the ends of a box, -1 to 1, scatters by 4 / sqrt(20).
+const LIES_APART_FRAC: f64 = 0.9;
 
 /// The force balance with one more channel.
 const fn with(channel: C) -> [C; 5] {
@@ -51,7 +52,7 @@ const fn h(
     min_size: f64,
     sign: f64,
 ) -> Hypothesis {
-    Hypothesis { id, sizes, shapes, starts, channels, min_size, sign, course: &[], along_with: &[] }
+    Hypothesis { id, sizes, shapes, starts, channels, min_size, sign, course: &[], brings: &[] }
 }
 
 impl Hypothesis {
@@ -59,15 +60,14 @@ impl Hypothesis {
         Self { course, ..self }
     }
 
-    const fn with(self, along_with: &'static [(P, f64)]) -> Self {
-        Self { along_with, ..self }
+    const fn bringing(self, brings: &'static [(P, f64)]) -> Self {
+        Self { brings, ..self }
     }
 }
 
 /// All hypotheses.
 pub(crate) const CATALOGUE: &[Hypothesis] = &[
-    // How much more a tyre rolls at speed is its own: from 20 to 100 km/h a tenth to a third (coefficients
-    // of SAE J2452), more in a soft one.
+    // How rolling grows with speed is a tyre's own: by none to 0.026 s/m of it (Rakha 2001, radial tyres).
     h("rolling_resistance", &[P::Rolling], &[], ONE, LONG, 0.06, 0.0)
         .along(&[Made("speed_m_s"), Open("time_s")]),
     h("air_drag", &[P::Drag], &[], ONE, LONG, 0.05, 0.0).along(&[Open("time_s")]),
@@ -84,7 +84,10 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     .along(&[Weather("time_s")]),
     h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0)
         .along(&[Open("grade_frac"), Open("accel_y_m_s2")])
-        .with(&[(P::PayloadX, LOADED_ELSEWHERE_M), (P::PayloadSpread, LOADED_APART)]),
+        .bringing(&[
+            (P::PayloadX, TRAIN_OVER_PAYLOAD * LIES_ELSEWHERE_M),
+            (P::PayloadSpread, TRAIN_OVER_PAYLOAD * LIES_APART_FRAC),
+        ]),
     h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0)
         .along(&[Open("grade_frac")]),
     h("map_shift", &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0)

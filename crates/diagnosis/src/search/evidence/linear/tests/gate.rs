@@ -73,3 +73,18 @@ fn a_cause_that_is_known_no_better_than_its_form_is_not_doubted_for_it() {
     let deviation = evidence.variances(&fit)[0].sqrt();
     assert!(size < 2.6 * deviation, "{size} {deviation}: else the test tells nothing");
 }
+
+/// A truck that was 14 % heavier than its load sheet, with what was loaded beyond it 1.2 m behind the rest,
+/// was told to have its payload 0.2 m too far back as well (123 nats).
+#[test]
+fn more_load_than_the_sheet_says_lies_somewhere() {
+    let columns = [(P::Mass, times(&wave(1), 400.0)), (P::PayloadX, times(&wave(2), 32.0))];
+    let named = |mass: f64, rearward_m: f64| {
+        let residual = plus(&times(&columns[0].1, mass), &times(&columns[1].1, rearward_m));
+        found(&alike(6, &residual, &columns), &[MASS, "payload_position"]).0
+    };
+    assert_eq!(named(0.14, 0.2), [MASS]);
+    // farther than more load can lie, and without more load
+    assert_eq!(named(0.14, 1.9).len(), 2);
+    assert_eq!(named(0.0, 0.2), ["payload_position"]);
+}
