@@ -1,5 +1,5 @@
 //! CO2 in the exhaust against the fuel rate: burnt diesel leaves
-//! [`CO2_PER_FUEL`](dynamics::effects::fuel::CO2_PER_FUEL) of it whatever the engine does, so that the
+//! [`CO2_PER_FUEL`] of it whatever the engine does, so that the
 //! two instruments check each other.
 //!
 //! Rows are means over fifteen seconds, longer than the way through exhaust and sampling tunnel. Left

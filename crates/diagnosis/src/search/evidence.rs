@@ -1,6 +1,6 @@
 //! What the search compares explanations by: residuals and sensitivities of a set of drives in one
 //! metric, whatever they come from. The replay is one source; a few given matrices are another
-//! ([`linear`](mod@linear), for tests of microseconds).
+//! (`linear`, for tests of microseconds).
 
 #[cfg(test)]
 pub(crate) mod linear;

@@ -4,7 +4,7 @@
 //! (secant sensitivities at the fitted point, one Gram matrix), the best are refitted by
 //! Gauss-Newton, and the best refit is taken if it beats the threshold: six nats for the first
 //! cause, ten for a further one. What a helper would patch of the form of a large cause is in the
-//! score already ([`crate::course`]).
+//! score already ([`crate::problem::course`]).
 
 use crate::causes::hypothesis::{CATALOGUE, Hypothesis};
 use crate::causes::param::{PARAMS, Spec, Theta};

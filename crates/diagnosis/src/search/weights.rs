@@ -5,11 +5,11 @@
 //! ```
 //! (MacKay, Neural Computation 4, 1992). A cause's probability is the share of the models
 //! that hold it: the set that was found, the sets with one of its causes left out or replaced by
-//! another one, and none at all. What a cause adds to the form of a large one is no evidence for it ([`crate::course`]).
+//! another one, and none at all. What a cause adds to the form of a large one is no evidence for it ([`crate::problem::course`]).
 //!
 //! A free function in the place of a cause is a model like any other: what has no name may share a
 //! cause's part of the balance and follow a signal. One beside the causes is judged before
-//! ([`crate::sure`]).
+//! ([`crate::outside::sure`]).
 
 use std::collections::BTreeMap;
 

@@ -13,7 +13,7 @@
 //! that is itself known from a few drives only: from as many as say something of the size, one or two
 //! where the baseline was hardly ever hot or high. Without a baseline nothing is known of it, `E` is what
 //! it is. The third: the form of a cause is known to a part
-//! `rho` of it ([`crate::course`]), along the signals that drive it and in any other way; that part is as
+//! `rho` of it ([`crate::problem::course`]), along the signals that drive it and in any other way; that part is as
 //! likely to look like one as like another of the `K` causes that show in its modules,
 //! `tau² = rho² |theta_j S_j|² / (K |S|²)` (a discrepancy in the span of what could be mistaken for a
 //! cause: Kennedy and O'Hagan, J. R. Statist. Soc. B 63, 2001).
