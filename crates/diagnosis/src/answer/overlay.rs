@@ -88,6 +88,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ) => Nowhere("the truck file has no derating by coolant temperature"),
         ("turbo_lag", "lag_s") => Plus("engine.slow_lag_s", 1.0),
         ("turbo_lag", "threshold_offset_frac") => Plus("engine.lag_threshold_frac", 1.0),
+        ("turbo_lag", "threshold_width_frac") => Plus("engine.lag_width_frac", 1.0),
         ("pedal_delay", "delay_s") => Plus("engine.pedal_delay_s", 1.0),
         // The truck file's delay carries the sum of dead time and lag.
         ("pedal_delay", "lag_frac") => Carry::Implied,

@@ -96,10 +96,11 @@ pub(crate) enum P {
     SideBehind,
     MeshLoss,
     PedalLag,
+    TurboWidth,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 85;
+pub(crate) const PARAMS: usize = 86;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -244,6 +245,8 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::MeshLoss, "mesh_loss_frac", "1", (0.015, -0.05, 0.2, 0.005), 0.0, 0.0),
     // The engine's control unit smooths the pedal, or it only comes late.
     s(P::PedalLag, "lag_frac", "1", (0.5, 0.0, 1.0, 0.1), 0.0, 0.0),
+    // A turbocharger has its speed at once, or over a good part of the load.
+    s(P::TurboWidth, "threshold_width_frac", "1", (0.15, 0.0, 0.6, 0.03), 0.0, 0.0),
 ];
 
 impl Spec {

@@ -42,14 +42,20 @@ pub(crate) fn signals(p: P) -> impl Iterator<Item = (&'static str, f64)> {
     own.into_iter().flat_map(|h| h.course.iter().map(|along| (along.signal(), rho(h, along))))
 }
 
-/// Part of a cause that its form may differ by.
+/// Part of a cause that its form may differ by, in whatever way: the widest of its courses, and what its
+/// law is open to.
 pub(crate) fn form(h: &Hypothesis) -> f64 {
+    h.course.iter().map(|along| rho(h, along)).fold(law(h), f64::max)
+}
+
+/// What the law of a cause is open to.
+fn law(h: &Hypothesis) -> f64 {
     if h.of_truck().is_some_and(|c| c.law == Law::Chosen) { RHO_SHAPE } else { RHO }
 }
 
 fn rho(h: &Hypothesis, along: &Along) -> f64 {
     match along {
-        Along::Open(_) => form(h),
+        Along::Open(_) => law(h),
         Along::Fitted(_) => RHO,
         Along::Weather(_) => WEATHER,
         Along::Made(_) | Along::Wanders(_) => RHO_SHAPE,
@@ -78,6 +84,8 @@ struct Effect {
     hats: Vec<(f64, Vec<usize>)>,
     /// What it brings along, with its deviation per unit of the size.
     brings: Vec<(f64, usize)>,
+    /// Its size is to be stated.
+    stated: bool,
 }
 
 impl Effect {
@@ -87,6 +95,22 @@ impl Effect {
         let of = if weather(self.of) { self.of.sizes } else { &own };
         let squared = |p: &P| (theta[*p as usize] - zero[*p as usize]).powi(2);
         of.iter().map(squared).sum::<f64>().sqrt()
+    }
+
+    /// Its hats with their deviations at a size.
+    ///
+    /// A course is one of what shows of a cause: where the tolerances can take a cause (a headwind is
+    /// almost a little more drag) but not its course, the course shows no more than the cause does.
+    /// Else any cause would bring a free function along for what trucks in order leave, too. A size is
+    /// known no better than its form all the same.
+    fn hats<'a>(&'a self, gram: &'a Gram, size: f64) -> impl Iterator<Item = (usize, f64)> + 'a {
+        let shows = |j: usize| gram.per_drive.iter().map(|g| g[(j, j)]).sum::<f64>();
+        self.hats.iter().flat_map(move |(rho, hats)| {
+            let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
+            let shown = (shows(self.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
+            let part = if self.stated { 1.0 } else { shown };
+            hats.iter().map(move |j| (*j, rho * size * part))
+        })
     }
 
     /// Its scatter between drives, in its size.
@@ -125,7 +149,7 @@ impl Course {
                 brings.push((*per_unit, directions.len() + 1));
                 directions.push(Direction::new(*brought, Vec::new(), brought.spec().step));
             }
-            out.push(Effect { p, of, column: j + 1, hats, brings });
+            out.push(Effect { p, of, column: j + 1, hats, brings, stated: false });
         }
         Self(out)
     }
@@ -156,6 +180,18 @@ impl Course {
         out
     }
 
+    /// The same for stating a size: along a signal over which a form is fitted, too, another law may
+    /// differ by as much as the catalogue's is open.
+    pub(crate) fn stated(&self) -> Self {
+        let mut out = self.clone();
+        for e in &mut out.0 {
+            e.stated = true;
+            let open = law(e.of);
+            e.hats.iter_mut().for_each(|(rho, _)| *rho = rho.max(open));
+        }
+        out
+    }
+
     /// The same without the effects of some sizes.
     pub(crate) fn without(&self, sizes: &[P]) -> Self {
         Self(self.0.iter().filter(|e| !sizes.contains(&e.p)).cloned().collect())
@@ -163,10 +199,6 @@ impl Course {
 
     /// The Gram matrix over the columns `keep` with these effects taken out, the sizes being those of
     /// `theta` beyond `zero`. `None` where it is not positive definite.
-    ///
-    /// A course is one of what shows of a cause: where the tolerances can take a cause (a headwind is
-    /// almost a little more drag) but not its course, the course shows no more than the cause does.
-    /// Else any cause would bring a free function along for what trucks in order leave, too.
     pub(crate) fn taken_out(
         &self,
         gram: &Gram,
@@ -174,20 +206,39 @@ impl Course {
         theta: &Theta,
         zero: &Theta,
     ) -> Option<Gram> {
-        let shows = |j: usize| gram.per_drive.iter().map(|g| g[(j, j)]).sum::<f64>();
         let (mut between, mut along) = (Vec::new(), Vec::new());
         for e in &self.0 {
             let size = e.size(theta, zero);
             between.push((e.column, e.between() * size));
-            for (rho, hats) in &e.hats {
-                let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
-                let part = (shows(e.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-                let to = if of_drive(e.of) { &mut between } else { &mut along };
-                to.extend(hats.iter().map(|j| (*j, rho * size * part)));
-            }
+            let to = if of_drive(e.of) { &mut between } else { &mut along };
+            to.extend(e.hats(gram, size));
             along.extend(e.brings.iter().map(|(per_unit, j)| (*j, per_unit * size)));
         }
         gram.marginal(keep, &between, &along)
+    }
+
+    /// What the courses that all drives share add to the sizes on the whole, in each direction of a
+    /// Gram matrix at `theta`: the multiple of the catalogue's law that comes nearest to the cause with its
+    /// course as the drives have it (best linear prediction: Robinson, Stat. Sci. 6, 1991).
+    pub(crate) fn on_the_whole(
+        &self,
+        gram: &Gram,
+        theta: &Theta,
+        zero: &Theta,
+    ) -> Option<Vec<f64>> {
+        let (information, _, _) = gram.sum(|_| true);
+        let all: Vec<usize> = (0..=information.nrows()).collect();
+        let (_, pull, _) = self.taken_out(gram, &all, theta, zero)?.total();
+        let mut out = vec![0.0; information.nrows()];
+        for e in self.0.iter().filter(|e| !of_drive(e.of)) {
+            let own = e.column - 1;
+            let per = information[(own, own)].max(f64::MIN_POSITIVE);
+            let hats = e
+                .hats(gram, e.size(theta, zero))
+                .map(|(j, sigma)| sigma * sigma * pull[j - 1] * information[(own, j - 1)] / per);
+            out[own] += hats.sum::<f64>();
+        }
+        Some(out)
     }
 }
 

@@ -92,7 +92,7 @@ fn part(h: &Hypothesis, part: f64) -> (Theta, Cause) {
         let x = match p {
             P::StiffnessFollows | P::StiffnessFollowsMass | P::FuelLowOver => 1.0,
             P::SteerDelay | P::PedalLag | P::RetarderSaturation => 0.0,
-            _ => part * s.prior,
+            _ => (part * s.prior).max(s.lo),
         };
         theta[p as usize] = x;
         let value = if s.key.ends_with("scale") { 1.0 + x } else { x };

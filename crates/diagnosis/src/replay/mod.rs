@@ -18,6 +18,7 @@ mod powertrain;
 mod prepared;
 mod profiles;
 mod retarder;
+mod rise;
 mod rows;
 mod section;
 mod sensors;
@@ -211,6 +212,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::HeatCoolantLag
         | P::TurboLag
         | P::TurboStart
+        | P::TurboWidth
         | P::PedalDelay
         | P::PedalLag
         | P::TorqueReport => &[G::Torque],

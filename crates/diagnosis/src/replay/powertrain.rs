@@ -10,6 +10,7 @@ use tractrix_core::{RPM_PER_RAD_S, ZERO_DEGC_K};
 use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
+use super::rise::Rise;
 use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -20,12 +21,10 @@ const COOLANT_DEGC: f64 = 98.0;
 pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Torque as usize];
     let (engine, file) = (&plant.control, &plant.truck.engine);
-    let rise = Rise {
-        fast_s: file.fast_lag_s,
-        slow_s: (file.slow_lag_s + t[P::TurboLag as usize]).max(0.02),
-    };
-    let from = (file.lag_threshold_frac + t[P::TurboStart as usize]).max(0.0);
-    let keep = [rise.fast_s, rise.slow_s].map(|lag| (-Drive::STEP_S / lag).exp());
+    let slow_s = (file.slow_lag_s + t[P::TurboLag as usize]).max(0.02);
+    let about = (file.lag_threshold_frac + t[P::TurboStart as usize]).max(0.0);
+    let half = 0.5 * (file.lag_width_frac + t[P::TurboWidth as usize]);
+    let rise = Rise::new([file.fast_lag_s, slow_s], [about - half, about + half]);
     let percent = 100.0 / file.reference_torque_nm * (1.0 + t[P::TorqueReport as usize]);
     let pedal = late_pedal(d, file.pedal_delay_s, t);
     let derating = Derating::new(d, plant, t);
@@ -47,13 +46,7 @@ pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
             let n = d.turning[i];
             let full = d.full_load[i] * derating.left(d, i);
             let demand = engine.governed_nm(engine.pedal_demand_nm(pedal[i], n, full), n, full);
-            let threshold = from * full;
-            torque = if torque < threshold && threshold < demand {
-                rise.across(torque, demand, threshold, keep[0])
-            } else {
-                demand
-                    + (torque - demand) * keep[usize::from(demand > torque && torque >= threshold)]
-            };
+            torque = rise.sample(torque, demand, full);
             out[k] += 0.5 * (d.torque[i] - torque.max(0.0) * percent);
         }
     }
@@ -73,25 +66,6 @@ fn late_pedal(d: &Prepared, file_s: f64, t: &Theta) -> Arc<[f64]> {
         // What a lag follows over a sample is the mean over it.
         followed((0..d.n).map(|i| late(i, 0.5)), late(0, 0.0), lag_s)
     })
-}
-
-/// Lags of the torque on its way up, s.
-struct Rise {
-    fast_s: f64,
-    slow_s: f64,
-}
-
-impl Rise {
-    /// Torque after a sample in which it may pass the threshold of the slow lag, exactly for a
-    /// constant demand; `keep` is what the fast lag leaves of the gap in a whole sample.
-    fn across(&self, torque: f64, demand: f64, threshold: f64, keep: f64) -> f64 {
-        let (gap, left) = (demand - torque, demand - threshold);
-        if gap * keep >= left {
-            return demand - gap * keep;
-        }
-        let slow_s = Drive::STEP_S - self.fast_s * (gap / left).ln();
-        demand - left * (-slow_s / self.slow_s).exp()
-    }
 }
 
 /// What altitude, air and coolant temperature take from the full load: loss per unit, and where it
@@ -286,22 +260,6 @@ mod tests {
             // 0.6 s after the step, 0.2 s after a dead time alone would have passed.
             let expected = if lag_s > 0.0 { 1.0 - (-(0.2 + lag_s) / lag_s).exp() } else { 1.0 };
             assert!((soon / 0.8 - expected).abs() < 0.06, "{lag_frac}: {soon}");
-        }
-    }
-
-    #[test]
-    fn a_sample_across_the_threshold_is_that_of_many_small_steps() {
-        let rise = Rise { fast_s: 0.15, slow_s: 0.9 };
-        let keep = (-Drive::STEP_S / rise.fast_s).exp();
-        for (from, demand) in [(800.0, 2600.0), (905.0, 1500.0), (300.0, 1000.0)] {
-            let (threshold, steps) = (910.0, 100_000);
-            let mut torque: f64 = from;
-            for _ in 0..steps {
-                let lag = if torque > threshold { rise.slow_s } else { rise.fast_s };
-                torque += (demand - torque) * Drive::STEP_S / f64::from(steps) / lag;
-            }
-            let at_once = rise.across(from, demand, threshold, keep);
-            assert!((at_once - torque).abs() < 0.05, "{from}: {at_once} {torque}");
         }
     }
 }

@@ -1,15 +1,18 @@
 //! Which of the fitted causes are kept: large enough for a word, and there more probably than not, by
 //! what they are worth once the drives' disagreement counts ([`crate::search::worth`]).
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::causes::hypothesis::CATALOGUE;
+use crate::causes::param::Theta;
 use crate::problem::Direction;
+use crate::problem::course::Course;
+use crate::problem::stats::evidence::posterior;
 use crate::search::decisions::{
     DISPERSION_PRIOR, OWN_SIZES, OWN_SIZES_PART, PRIOR_CAUSE, STRONG_NATS, WORTH,
 };
 use crate::search::evidence::Evidence;
-use crate::search::free::prior;
+use crate::search::free::{directions, prior};
 use crate::search::refit::Fit;
 use crate::search::weights::log_odds;
 
@@ -23,6 +26,12 @@ fn from_one_drive(fit: &Fit, fewer: &Fit) -> bool {
     gains.len() > 2 && gains.iter().sum::<f64>() - most < -STRONG_NATS
 }
 
+/// The courses of a fit as sizes are stated.
+fn open(fit: &Fit) -> Course {
+    let mut along = directions(&fit.free, &fit.theta);
+    Course::of(&fit.sizes(), &mut along).stated()
+}
+
 impl dyn Evidence + '_ {
     /// Variances of the free parameters, widened by what the drives disagree about.
     ///
@@ -34,8 +43,30 @@ impl dyn Evidence + '_ {
     pub(crate) fn variances(&self, fit: &Fit) -> Vec<f64> {
         let freedom = fit.gram.per_drive.len() as f64 - 1.0 + DISPERSION_PRIOR;
         let t_factor = 1.0 + 1.2 / freedom;
+        let stated = self.stated(fit);
+        let covariance = stated.as_ref().unwrap_or(&fit.covariance);
         let dispersions = self.dispersions(fit).into_iter().enumerate();
-        dispersions.map(|(j, phi)| fit.covariance[(j, j)] * phi * t_factor * t_factor).collect()
+        dispersions.map(|(j, phi)| covariance[(j, j)] * phi * t_factor * t_factor).collect()
+    }
+
+    /// Covariance with the courses as widely open as sizes are stated ([`Course::stated`]).
+    fn stated(&self, fit: &Fit) -> Option<DMatrix<f64>> {
+        let keep: Vec<usize> = (0..=fit.free.len()).collect();
+        let gram = open(fit).taken_out(&fit.whole, &keep, &fit.theta, self.zero())?;
+        let sigma: Vec<f64> = fit.priors.iter().map(|p| p.sigma).collect();
+        posterior(&gram.total().0, &sigma).map(|(covariance, _)| covariance)
+    }
+
+    /// Where a fit has its parameters once what the courses add to the sizes is counted to these
+    /// ([`Course::on_the_whole`]).
+    pub(crate) fn on_the_whole(&self, fit: &Fit) -> Theta {
+        let mut theta = fit.theta;
+        let more = open(fit).on_the_whole(&fit.whole, &fit.theta, self.zero());
+        for (p, more) in fit.free.iter().zip(more.into_iter().flatten()) {
+            let (s, i) = (p.spec(), *p as usize);
+            theta[i] = (theta[i] + more).clamp(self.zero()[i] + s.lo, self.zero()[i] + s.hi);
+        }
+        theta
     }
 
     /// Over-dispersion of the drives about every free parameter.

@@ -10,7 +10,8 @@
 //! The demand of a pedal is `pedal (T_full + T_f)` (an all-torque pedal), or a map over pedal and
 //! speed where the truck file gives one. The cylinder charge follows with two first-order lags:
 //! a slow one (turbocharger) while it rises above `lag_threshold_frac` of full load, a fast one
-//! otherwise: charge that is there can be left unused at once.
+//! otherwise: charge that is there can be left unused at once. Over `lag_width_frac` of full load about
+//! that threshold the one passes evenly into the other.
 //! J1939 SPN 513 is T_ind over the reference torque.
 //!
 //! Left out: cylinder cut-off, exhaust after-treatment, cold-start enrichment.
@@ -52,6 +53,9 @@ pub struct EngineParameters {
     pub slow_lag_s: f64,
     /// Share of full load at which the lag changes.
     pub lag_threshold_frac: f64,
+    /// Share of full load over which it does, half of it on either side.
+    #[serde(default)]
+    pub lag_width_frac: f64,
     /// Dead time from pedal to demand, s.
     pub pedal_delay_s: f64,
     /// Largest rise of the torque demand, Nm/s; none = unlimited.
@@ -150,6 +154,7 @@ impl EngineParameters {
         b.within("fast_lag_s", self.fast_lag_s, 0.005, 5.0);
         b.within("slow_lag_s", self.slow_lag_s, 0.005, 10.0);
         b.within("lag_threshold_frac", self.lag_threshold_frac, 0.0, 1.0);
+        b.within("lag_width_frac", self.lag_width_frac, 0.0, 1.0);
         b.within("pedal_delay_s", self.pedal_delay_s, 0.0, crate::state::MAX_DELAY_S);
         b.within("torque_rise_nm_s", self.torque_rise_nm_s.unwrap_or(1.0), 1.0, 1e6);
         b.within("torque_fall_nm_s", self.torque_fall_nm_s.unwrap_or(1.0), 1.0, 1e6);
@@ -280,18 +285,23 @@ impl Engine {
         demand_nm.min(full_load_nm + self.friction_nm(speed_rad_s)) * governor
     }
 
-    /// Whether torque on its way from a level to a target waits for the turbocharger.
-    #[inline]
-    #[must_use]
-    pub fn boosts(&self, indicated_nm: f64, target_nm: f64, full_load_nm: f64) -> bool {
-        target_nm > indicated_nm && indicated_nm > self.parameters.lag_threshold_frac * full_load_nm
-    }
-
     /// Lag of the torque on its way from a level to a target, s.
     #[must_use]
     pub fn lag_s(&self, indicated_nm: f64, target_nm: f64, full_load_nm: f64) -> f64 {
         let p = &self.parameters;
-        if self.boosts(indicated_nm, target_nm, full_load_nm) { p.slow_lag_s } else { p.fast_lag_s }
+        if target_nm <= indicated_nm {
+            return p.fast_lag_s;
+        }
+        let from_nm = (p.lag_threshold_frac - 0.5 * p.lag_width_frac) * full_load_nm;
+        let over_nm = indicated_nm - from_nm;
+        let width_nm = p.lag_width_frac * full_load_nm;
+        if over_nm <= 0.0 {
+            p.fast_lag_s
+        } else if over_nm >= width_nm {
+            p.slow_lag_s
+        } else {
+            p.fast_lag_s + (p.slow_lag_s - p.fast_lag_s) * over_nm / width_nm
+        }
     }
 
     /// Whether the fan runs at a coolant temperature, given whether it ran before.

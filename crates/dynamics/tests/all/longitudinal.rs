@@ -1,5 +1,6 @@
 //! Longitudinal dynamics against closed forms.
 
+use dynamics::effects::engine::Engine;
 use dynamics::{RoadPatch, TruckModel, TruckParameters, TruckState};
 use tractrix_core::{BrakeMode, Command, GRAVITY_M_S2, GearRequest};
 
@@ -221,6 +222,38 @@ fn hot_brakes_fade_and_cool_again() {
     let cooled =
         run(&m, &m.initial_state(0.0, 0.0, 0.0, 0.0), &braking(1.0), &RoadPatch::default(), 1.0);
     assert!(cooled.brake.temperature_k[1] < 294.0);
+}
+
+/// A turbocharger that comes softly: the lag passes evenly from the one to the other about its threshold,
+/// and at once where the band has no width.
+#[test]
+fn the_lag_of_boost_comes_over_the_band_that_the_truck_file_gives() {
+    let engine = |width_frac: f64| {
+        let mut p = TruckParameters::load("reference").unwrap();
+        for (path, value) in [
+            ("engine.fast_lag_s", 0.1),
+            ("engine.slow_lag_s", 0.9),
+            ("engine.lag_threshold_frac", 0.4),
+            ("engine.lag_width_frac", width_frac),
+        ] {
+            p = p.with_parameter(path, value).unwrap();
+        }
+        Engine::new(p.engine).unwrap()
+    };
+    let (soft, sudden) = (engine(0.2), engine(0.0));
+    for (part, soft_s, sudden_s) in [
+        (0.2, 0.1, 0.1),
+        (0.3, 0.1, 0.1),
+        (0.35, 0.3, 0.1),
+        (0.4, 0.5, 0.1),
+        (0.45, 0.7, 0.9),
+        (0.5, 0.9, 0.9),
+    ] {
+        let lag_s = |e: &Engine| e.lag_s(part * 2_000.0, 2_000.0, 2_000.0);
+        assert!((lag_s(&soft) - soft_s).abs() < 1e-9, "{part}: {}", lag_s(&soft));
+        assert_eq!(lag_s(&sudden), sudden_s, "{part}");
+    }
+    assert_eq!(soft.lag_s(1_000.0, 500.0, 2_000.0), 0.1);
 }
 
 /// After a long descent discs that are held hot warm the linings by `1 - exp(-t/tau)`; without a lag

@@ -47,7 +47,7 @@ pub(crate) enum Along {
     /// [`RHO_SHAPE`]: crate::search::decisions::RHO_SHAPE
     Made(&'static str),
     /// Its form is fitted over it (onset and slope, threshold and hysteresis, knee): with a wide course
-    /// beside it the two would be free of each other.
+    /// beside it the two would be free of each other. Its size is stated as if it were open.
     Fitted(&'static str),
     /// It is weather: of every drive for itself, it swells and turns.
     Weather(&'static str),

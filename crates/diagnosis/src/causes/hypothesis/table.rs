@@ -26,6 +26,8 @@ const ONE: &[Start] = &[[0.0; 2]];
 const EITHER_SIDE: &[Start] = &[[0.0, 0.0], [0.2, 0.0]];
 /// A delay is a dead time, a lag or both.
 const LATE_OR_SLOW: &[Start] = &[[0.0, 0.0], [0.7, 0.0]];
+/// Boost is there from one load on, or comes over a quarter of it.
+const SUDDEN_OR_SOFT: &[Start] = &[[0.0, 0.0], [0.0, 0.25]];
 /// A meter of a rate may be off by a factor, or more the higher the rate.
 const RATES: &[Start] = &[[0.0, 0.0], [1.0, 0.0]];
 
@@ -157,8 +159,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         1.0,
     )
     .along(&[Fitted("coolant_temp_degc"), Open("engine_speed_rpm")]),
-    h("turbo_lag", &[P::TurboLag], &[P::TurboStart], ONE, PEDAL, 0.08, 0.0)
-        .along(&[Open("engine_speed_rpm")]),
+    h(
+        "turbo_lag",
+        &[P::TurboLag],
+        &[P::TurboStart, P::TurboWidth],
+        SUDDEN_OR_SOFT,
+        PEDAL,
+        0.08,
+        0.0,
+    )
+    .along(&[Open("engine_speed_rpm"), Fitted("engine_torque_percent")]),
     h("pedal_delay", &[P::PedalDelay], &[P::PedalLag], ONE, PEDAL, 0.03, 0.0)
         .along(&[Open("engine_speed_rpm")]),
     h("shift_duration", &[P::ShiftTime], &[], ONE, &[C::ShiftInProcess], 0.08, 0.0)
