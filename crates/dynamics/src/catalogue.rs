@@ -7,8 +7,7 @@
 //!
 //! Prior spreads and bounds are engineering ranges for highway trucks (weather wind 4 m/s, load
 //! sheets 8 %, tyres and linings 20 %); they are the spread of the cause where it is present, not
-//! the tolerance of a truck in order. Left out: derating by coolant temperature (only by air
-//! temperature), and delays above [`crate::MAX_DELAY_S`].
+//! the tolerance of a truck in order. Left out: delays above [`crate::MAX_DELAY_S`].
 
 use std::collections::BTreeMap;
 
@@ -231,8 +230,11 @@ pub static CATALOGUE: [Cause; 37] = [
         [add("engine.derate_altitude_m", "m", 600.0, -1_500.0, 1_500.0)]),
     cause!("heat_derate", MissingPhysics, Chosen,
         "full load falls in the heat" / "full load falls in the heat",
-        [add("engine.derate_air_1_k", "1/K", 0.006, 0.0, 0.05)],
-        [add("engine.derate_air_k", "K", 6.0, -20.0, 12.0)]),
+        [add("engine.derate_air_1_k", "1/K", 0.006, 0.0, 0.05),
+         add("engine.derate_coolant_1_k", "1/K", 0.01, 0.0, 0.06)],
+        [add("engine.derate_air_k", "K", 6.0, -20.0, 12.0),
+         add("engine.derate_coolant_k", "K", 5.0, -14.0, 14.0),
+         add("engine.derate_coolant_lag_s", "s", 20.0, 0.0, 120.0)]),
     cause!("turbo_lag", Value, Chosen,
         "torque builds up slower than modelled" / "torque builds up faster than modelled",
         [scale("engine.slow_lag_s", 0.9, -0.9, 8.0)],
@@ -264,8 +266,10 @@ pub static CATALOGUE: [Cause; 37] = [
     cause!("hidden_retarder", MissingPhysics, Chosen,
         "a retarder acts that the model does not have"
         / "a retarder acts that the model does not have",
-        [add("driveline.hidden_retarder_torque_nm", "Nm", 800.0, 0.0, 5_000.0)],
-        [add("driveline.hidden_retarder_from_m_s", "m/s", 3.0, -7.0, 7.0)]),
+        [add("driveline.hidden_retarder_torque_nm", "Nm", 800.0, 0.0, 5_000.0),
+         add("driveline.hidden_retarder_downhill_nm", "Nm", 800.0, 0.0, 5_000.0)],
+        [add("driveline.hidden_retarder_from_m_s", "m/s", 3.0, -7.0, 7.0),
+         add("driveline.hidden_retarder_from_descent_frac", "1", 0.01, 0.0, 0.03)]),
     // Tyres grow with speed and slip with pull: no factor is the same everywhere.
     cause!("speed_scale", Instrument, Chosen,
         "the wheel speed reads too high" / "the wheel speed reads too low",

@@ -106,6 +106,8 @@ pub struct TruckState {
     pub tyre_warmth: f64,
     /// Coolant temperature, K.
     pub coolant_k: f64,
+    /// How far the engine's controller holds it to be too hot, K.
+    pub overheat_k: f64,
     /// The cooling fan runs.
     pub fan_runs: bool,
     /// Fuel used, g.

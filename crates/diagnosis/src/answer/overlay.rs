@@ -47,12 +47,10 @@ enum Carry {
     BrakeDemand,
     /// The simulator does it without being told, or another parameter stands for it.
     Implied,
-    /// Nothing carries it.
-    Nowhere(&'static str),
 }
 
 fn carry(id: &str, key: &str) -> Option<Carry> {
-    use Carry::{Exp, Nowhere, Plus, Times};
+    use Carry::{Exp, Plus, Times};
     Some(match (id, key) {
         ("rolling_resistance", "coefficient_scale") => Times("resistance.rolling_coeff"),
         ("air_drag", "cd_a_scale") => Times("resistance.drag_area_m2"),
@@ -82,10 +80,9 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("altitude_derate", "start_offset_m") => Plus("engine.derate_altitude_m", 1.0),
         ("heat_derate", "torque_loss_per_10_k_air") => Plus("engine.derate_air_1_k", 0.1),
         ("heat_derate", "air_start_offset_k") => Plus("engine.derate_air_k", 1.0),
-        (
-            "heat_derate",
-            "torque_loss_per_10_k_coolant" | "coolant_start_offset_k" | "derating_lag_s",
-        ) => Nowhere("the truck file has no derating by coolant temperature"),
+        ("heat_derate", "torque_loss_per_10_k_coolant") => Plus("engine.derate_coolant_1_k", 0.1),
+        ("heat_derate", "coolant_start_offset_k") => Plus("engine.derate_coolant_k", 1.0),
+        ("heat_derate", "derating_lag_s") => Plus("engine.derate_coolant_lag_s", 1.0),
         ("turbo_lag", "lag_s") => Plus("engine.slow_lag_s", 1.0),
         ("turbo_lag", "threshold_offset_frac") => Plus("engine.lag_threshold_frac", 1.0),
         ("turbo_lag", "threshold_width_frac") => Plus("engine.lag_width_frac", 1.0),
@@ -105,8 +102,11 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("brake_delay", "delay_s") => Plus("brake.dead_time_s", 1.0),
         ("hidden_retarder", "torque_per_stage_nm") => Carry::Retarder,
         ("hidden_retarder", "force_n_per_m_s2") => Carry::BrakeDemand,
-        ("hidden_retarder", "torque_downhill_nm" | "descent_from_frac") => {
-            Nowhere("the truck file has no retarder that acts on descents alone")
+        ("hidden_retarder", "torque_downhill_nm") => {
+            Plus("driveline.hidden_retarder_downhill_nm", 1.0)
+        }
+        ("hidden_retarder", "descent_from_frac") => {
+            Plus("driveline.hidden_retarder_from_descent_frac", 1.0)
         }
         // A gain of the brakes, which stands for it, has no limit.
         ("hidden_retarder", "saturation_s2_m") => Carry::Implied,
@@ -205,7 +205,7 @@ impl Carry {
                 let path = "brake.gain_scale_coeff";
                 one(path, now(path) * (1.0 + value * per_mass), now(path) * sigma * per_mass)
             }
-            Self::Implied | Self::Nowhere(_) => Vec::new(),
+            Self::Implied => Vec::new(),
         }
     }
 }
@@ -282,9 +282,6 @@ fn carried(
     for (key, p) in &cause.parameters {
         let carry =
             carry(cause.id, key).ok_or_else(|| format!("no figure carries its parameter {key}"))?;
-        if let Carry::Nowhere(why) = carry {
-            return Err(why.to_owned());
-        }
         for figure in carry.figures(truck, p.value, p.sigma) {
             let bounds = bounds(truck, cause.id, figure.path);
             let mut source = format!("{origin}: {} = {:.6} {}", cause.id, p.value, p.unit);
@@ -346,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn every_parameter_of_every_hypothesis_has_a_place_or_says_that_it_has_none() {
+    fn every_parameter_of_every_hypothesis_has_a_place() {
         let truck = TruckParameters::load("reference").unwrap();
         for h in CATALOGUE {
             for p in h.params() {
@@ -414,12 +411,33 @@ mod tests {
     fn a_cause_without_a_figure_is_not_lost_silently() {
         let truck = TruckParameters::load("reference").unwrap();
         let found = [
-            cause("heat_derate", &[("torque_loss_per_10_k_coolant", 0.1, 0.01)]),
+            cause("heat_derate", &[("torque_loss_by_the_moon", 0.1, 0.01)]),
             cause("mass", &[("mass_scale", 0.92, 0.004)]),
         ];
         let e = extend(&truck, "reference", "x", &found, "test");
         assert_eq!(e.not_carried.len(), 1);
         assert_eq!(e.not_carried[0].id, "heat_derate");
+        assert!(e.not_carried[0].why.contains("torque_loss_by_the_moon"));
         assert_eq!(e.overlay.unwrap().set.len(), 1);
+    }
+
+    /// Both were found and stayed out of the extended truck: its file had no place for them.
+    #[test]
+    fn a_hot_engine_and_a_retarder_of_descents_have_their_figures() {
+        let set = one(cause(
+            "heat_derate",
+            &[
+                ("torque_loss_per_10_k_coolant", 0.08, 0.01),
+                ("coolant_start_offset_k", -3.0, 0.5),
+                ("derating_lag_s", 25.0, 4.0),
+            ],
+        ));
+        assert!((set["engine.derate_coolant_1_k"].value - 0.008).abs() < 1e-12);
+        assert!((set["engine.derate_coolant_k"].value - 368.15).abs() < 1e-9);
+        assert!((set["engine.derate_coolant_lag_s"].sigma.unwrap() - 4.0).abs() < 1e-12);
+        let downhill = [("torque_downhill_nm", 900.0, 50.0), ("descent_from_frac", 0.012, 0.001)];
+        let set = one(cause("hidden_retarder", &downhill));
+        assert!((set["driveline.hidden_retarder_downhill_nm"].value - 900.0).abs() < 1e-9);
+        assert!((set["driveline.hidden_retarder_from_descent_frac"].value - 0.012).abs() < 1e-12);
     }
 }

@@ -104,6 +104,8 @@ impl<'a> Longitudinal<'a> {
         let fade = (brake.fade_1_k + 0.01 * at(P::Fade), brake.fade_from_k + at(P::FadeStart));
         let fan_w = plant.truck.engine.fan_power_w + 1e3 * at(P::FanPower);
         let cold = resistance.cold_tyre_extra_frac + at(P::WarmupAmp);
+        let on_slope_nm = driveline.hidden_retarder_downhill_nm + at(P::RetarderSlope);
+        let steep_frac = driveline.hidden_retarder_from_descent_frac + at(P::RetarderSteep);
         let on_coast_nm = driveline.hidden_retarder_torque_nm + at(P::RetarderCoast);
         Self {
             d: &d.balance,
@@ -133,8 +135,8 @@ impl<'a> Longitudinal<'a> {
             retarder_n: retarder_n(d, plant, at(P::RetarderStage)),
             blended_m_s2: (at(P::RetarderBrake) != 0.0)
                 .then(|| blended_m_s2(d, at(P::RetarderSaturation))),
-            on_slope_n: at(P::RetarderSlope) * per_prop,
-            downhill: (at(P::RetarderSlope) != 0.0).then(|| downhill(d, at(P::RetarderSteep))),
+            on_slope_n: on_slope_nm * per_prop,
+            downhill: (on_slope_nm != 0.0).then(|| downhill(d, steep_frac)),
             cold_left: (cold != 0.0 && !d.warm).then(|| cold_left(d, plant, t)),
         }
     }
@@ -305,6 +307,6 @@ impl Prepared {
 
 /// A step that rises evenly from `-width` to `width`: wholly on beyond, as a clutch is.
 #[inline]
-pub(super) fn step(x: f64, width: f64) -> f64 {
+fn step(x: f64, width: f64) -> f64 {
     (0.5 + 0.5 * x / width).clamp(0.0, 1.0)
 }

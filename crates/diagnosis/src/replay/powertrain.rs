@@ -14,9 +14,6 @@ use super::rise::Rise;
 use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
-/// Coolant temperature from which an engine protects itself, degC.
-const COOLANT_DEGC: f64 = 98.0;
-
 /// Torque response, percent of the reference torque, mean over two samples.
 pub(super) fn torque(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Torque as usize];
@@ -80,15 +77,17 @@ impl Derating {
     fn new(d: &Prepared, plant: &Plant, t: &Theta) -> Self {
         let (file, at) = (&plant.truck.engine, |p: P| t[p as usize]);
         let air_degc = file.derate_air_k - ZERO_DEGC_K;
+        let loss_1_k = file.derate_coolant_1_k + 0.1 * at(P::HeatCoolant);
         Self {
             thin: (
                 file.derate_altitude_1_m + 1e-3 * at(P::Altitude),
                 file.derate_altitude_m + at(P::AltitudeStart),
             ),
             hot: (file.derate_air_1_k + 0.1 * at(P::HeatAir), air_degc + at(P::HeatAirStart)),
-            boiling: (at(P::HeatCoolant) != 0.0).then(|| {
-                let from_degc = COOLANT_DEGC + at(P::HeatCoolantStart);
-                (0.1 * at(P::HeatCoolant), overheat(d, from_degc, at(P::HeatCoolantLag)))
+            boiling: (loss_1_k != 0.0).then(|| {
+                let from_degc = file.derate_coolant_k - ZERO_DEGC_K + at(P::HeatCoolantStart);
+                let lag_s = file.derate_coolant_lag_s + at(P::HeatCoolantLag);
+                (loss_1_k, overheat(d, from_degc, lag_s))
             }),
         }
     }

@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use dynamics::SUBSTEP_S;
+use dynamics::effects::driveline::from_descent_frac;
 
-use super::force::step;
 use super::inputs::pad;
 use super::prepared::Prepared;
 use super::profiles::Kind;
@@ -18,8 +18,6 @@ pub(crate) const RETARDER_LAG_S: f64 = 0.005;
 /// Lag behind what asks for it otherwise, s: filling with oil takes hydrodynamic ones some tenths of a
 /// second (our estimate; not fitted). It tells them from brakes, whose pressure is measured.
 const FILLS_S: f64 = 0.4;
-/// Over how much grade a retarder of descents acts more and more, to either side of where it begins, 1.
-const DESCENT_WIDTH_FRAC: f64 = 0.002;
 
 /// Force of a retarder that follows its stage, N: the file's, with `extra_nm` more at the propeller
 /// shaft.
@@ -53,8 +51,7 @@ pub(super) fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<A
 pub(super) fn downhill(d: &Prepared, from_frac: f64) -> Arc<[f64]> {
     d.profiles.get(Kind::Downhill, [from_frac], || {
         let asked = d.grade.iter().zip(&d.balance.coasts);
-        let asked =
-            asked.map(|(grade, coasts)| coasts * step(-grade - from_frac, DESCENT_WIDTH_FRAC));
+        let asked = asked.map(|(grade, coasts)| coasts * from_descent_frac(-grade, from_frac));
         pad(filled(asked), d.balance.padded)
     })
 }

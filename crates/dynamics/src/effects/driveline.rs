@@ -63,6 +63,12 @@ pub struct DrivelineParameters {
     /// Speed from which it acts, m/s.
     #[serde(default = "hidden_retarder_from_m_s")]
     pub hidden_retarder_from_m_s: f64,
+    /// The same of a retarder that holds the truck on descents alone, Nm.
+    #[serde(default)]
+    pub hidden_retarder_downhill_nm: f64,
+    /// Descent from which it acts.
+    #[serde(default)]
+    pub hidden_retarder_from_descent_frac: f64,
 }
 
 /// Pedal below which the accelerator counts as released.
@@ -77,6 +83,14 @@ const DIRECT_WITHIN: f64 = 1e-3;
 #[inline]
 pub fn from_speed_frac(speed_m_s: f64, from_m_s: f64) -> f64 {
     (0.5 + speed_m_s - from_m_s).clamp(0.0, 1.0)
+}
+
+/// Share of a torque that acts from a descent on, rising over 0.4 % of grade about it (own form, as by
+/// speed).
+#[must_use]
+#[inline]
+pub fn from_descent_frac(descent_frac: f64, from_frac: f64) -> f64 {
+    (0.5 + (descent_frac - from_frac) / 0.004).clamp(0.0, 1.0)
 }
 
 fn hidden_retarder_from_m_s() -> f64 {
@@ -131,6 +145,10 @@ impl DrivelineParameters {
         b.within("retarder_lag_s", self.retarder_lag_s, 0.005, 5.0);
         b.within("hidden_retarder_torque_nm", self.hidden_retarder_torque_nm, 0.0, 5_000.0);
         b.within("hidden_retarder_from_m_s", self.hidden_retarder_from_m_s, 1.0, 25.0);
+        let (downhill_nm, from) =
+            (self.hidden_retarder_downhill_nm, self.hidden_retarder_from_descent_frac);
+        b.within("hidden_retarder_downhill_nm", downhill_nm, 0.0, 5_000.0);
+        b.within("hidden_retarder_from_descent_frac", from, 0.0, 0.1);
         b.violations
     }
 
@@ -204,13 +222,23 @@ impl DrivelineParameters {
         torque_nm + (target_nm - torque_nm) * (dt_s / self.retarder_lag_s).min(1.0)
     }
 
-    /// Torque of the hidden retarder at a speed and a pedal, Nm.
+    /// Torque of the hidden retarders at a speed, a pedal and a descent (rise over run, positive
+    /// downhill), Nm. That of descents needs shafts that turn; that its oil fills within tenths of a second
+    /// is left out.
     #[must_use]
-    pub fn hidden_retarder_nm(&self, speed_m_s: f64, accelerator_pedal_frac: f64) -> f64 {
+    pub fn hidden_retarder_nm(
+        &self,
+        speed_m_s: f64,
+        accelerator_pedal_frac: f64,
+        descent_frac: f64,
+    ) -> f64 {
         if accelerator_pedal_frac >= RELEASED_PEDAL_FRAC {
             return 0.0;
         }
-        self.hidden_retarder_torque_nm * from_speed_frac(speed_m_s, self.hidden_retarder_from_m_s)
+        let coasting = from_speed_frac(speed_m_s, self.hidden_retarder_from_m_s);
+        let descending = from_descent_frac(descent_frac, self.hidden_retarder_from_descent_frac)
+            * speed_m_s.clamp(0.0, 1.0);
+        self.hidden_retarder_torque_nm * coasting + self.hidden_retarder_downhill_nm * descending
     }
 
     /// Wheel force of a torque at the propeller shaft, N.

@@ -90,6 +90,15 @@ pub struct EngineParameters {
     /// Loss of full load per kelvin above it, 1/K.
     #[serde(default)]
     pub derate_air_1_k: f64,
+    /// Coolant temperature above which full load falls, K.
+    #[serde(default = "derate_coolant_k")]
+    pub derate_coolant_k: f64,
+    /// Loss of full load per kelvin above it, 1/K.
+    #[serde(default)]
+    pub derate_coolant_1_k: f64,
+    /// Lag with which the controller follows the coolant, s.
+    #[serde(default)]
+    pub derate_coolant_lag_s: f64,
     /// Engine-brake torque at full demand, constant part, Nm.
     pub engine_brake_constant_nm: f64,
     /// Engine-brake torque at full demand per speed, Nm/rpm.
@@ -130,6 +139,9 @@ fn derate_altitude_m() -> f64 {
 fn derate_air_k() -> f64 {
     303.15
 }
+fn derate_coolant_k() -> f64 {
+    371.15
+}
 
 impl EngineParameters {
     /// Friction torque as the file gives it, unscaled, over speed (rad/s), Nm.
@@ -166,6 +178,9 @@ impl EngineParameters {
         b.within("derate_altitude_1_m", self.derate_altitude_1_m, 0.0, 1e-3);
         b.within("derate_air_k", self.derate_air_k, 250.0, 350.0);
         b.within("derate_air_1_k", self.derate_air_1_k, 0.0, 0.1);
+        b.within("derate_coolant_k", self.derate_coolant_k, 330.0, 400.0);
+        b.within("derate_coolant_1_k", self.derate_coolant_1_k, 0.0, 0.1);
+        b.within("derate_coolant_lag_s", self.derate_coolant_lag_s, 0.0, 600.0);
         b.within("engine_brake_constant_nm", self.engine_brake_constant_nm, 0.0, 5_000.0);
         b.within("engine_brake_per_rpm_nm", self.engine_brake_per_rpm_nm, 0.0, 5.0);
         b.within("engine_brake_scale_coeff", self.engine_brake_scale_coeff, 0.0, 3.0);
@@ -257,13 +272,29 @@ impl Engine {
             * (p.friction_constant_nm + p.friction_per_rpm_nm * speed_rad_s * RPM_PER_RAD_S)
     }
 
-    /// Full-load brake torque with altitude and heat derating, Nm.
+    /// Full-load brake torque with altitude and heat derating, Nm; the coolant by how far the controller
+    /// holds it to be too hot ([`Self::overheat_step_k`]).
     #[must_use]
-    pub fn full_load_at_nm(&self, speed_rad_s: f64, altitude_m: f64, air_k: f64) -> f64 {
+    pub fn full_load_at_nm(
+        &self,
+        speed_rad_s: f64,
+        altitude_m: f64,
+        air_k: f64,
+        overheat_k: f64,
+    ) -> f64 {
         let p = &self.parameters;
         let thin = left_frac(p.derate_altitude_1_m, altitude_m, p.derate_altitude_m);
         let hot = left_frac(p.derate_air_1_k, air_k, p.derate_air_k);
-        self.full_load_nm.at(speed_rad_s) * (thin * hot)
+        let boiling = left_frac(p.derate_coolant_1_k, overheat_k, 0.0);
+        self.full_load_nm.at(speed_rad_s) * (thin * hot * boiling)
+    }
+
+    /// How far the controller holds the coolant to be too hot after `dt_s`, K.
+    #[must_use]
+    pub fn overheat_step_k(&self, overheat_k: f64, coolant_k: f64, dt_s: f64) -> f64 {
+        let p = &self.parameters;
+        let over_k = (coolant_k - p.derate_coolant_k).max(0.0);
+        overheat_k + (over_k - overheat_k) * (dt_s / p.derate_coolant_lag_s.max(dt_s))
     }
 
     /// Indicated torque that a pedal demands, Nm.

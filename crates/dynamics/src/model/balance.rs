@@ -73,7 +73,7 @@ impl TruckModel {
         // What engine and engine brake leave of the drive axles' grip is the retarder's, then the
         // service brakes': the anti-lock system takes the retarder away before wheels slip.
         let own_n = d.shaft_force_n(s.retarder_nm);
-        let hidden_nm = d.hidden_retarder_nm(v, command.accelerator_pedal_frac);
+        let hidden_nm = d.hidden_retarder_nm(v, command.accelerator_pedal_frac, -sin / cos);
         let wanted_n = own_n + d.shaft_force_n(hidden_nm);
         let retarder_n = wanted_n.min(drive_limit + drive_n.min(0.0));
         let retarder_heat_n = own_n * if wanted_n > 0.0 { retarder_n / wanted_n } else { 0.0 };

@@ -156,6 +156,7 @@ impl TruckModel {
             },
             tyre_warmth: 0.0,
             coolant_k: 355.0,
+            overheat_k: 0.0,
             fan_runs: false,
             fuel_g: 0.0,
             fuel_rate_g_s: 0.0,
@@ -225,6 +226,7 @@ impl TruckModel {
             s.engine_speed_rad_s,
             patch.altitude_m,
             patch.air_temperature_k,
+            s.overheat_k,
         );
         self.shift(s, pedal, decel, full_load_nm, command);
         self.engine_torque(s, pedal, full_load_nm, command.retarder_frac.clamp(0.0, 1.0));
@@ -249,6 +251,7 @@ impl TruckModel {
         let air_k = patch.air_temperature_k;
         s.fan_runs = self.engine.fan_runs(s.fan_runs, s.coolant_k);
         s.coolant_k = self.coolant_step_k(s.coolant_k, s.fan_runs, &from, air_k, SUBSTEP_S);
+        s.overheat_k = self.engine.overheat_step_k(s.overheat_k, s.coolant_k, SUBSTEP_S);
     }
 
     /// Coolant temperature after `dt_s`, K.

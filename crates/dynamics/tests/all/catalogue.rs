@@ -23,7 +23,7 @@ fn extended(cause: &Cause, sizes: &[f64]) -> TruckParameters {
 }
 
 /// A drive over a road whose map is known: a climb at full load high up in the heat, coasting until
-/// it is slow, braking down the other side until the brakes are hot, then slalom; what the
+/// it is slow and down a gentle slope, braking down the other side until the brakes are hot, then slalom; what the
 /// instruments report every 0.5 s, and the CO2 in the exhaust, g/s.
 fn drive(truck: TruckParameters) -> Vec<(EgoState, f64)> {
     let model = TruckModel::new(truck, PAYLOAD_KG).unwrap();
@@ -33,8 +33,13 @@ fn drive(truck: TruckParameters) -> Vec<(EgoState, f64)> {
     for k in 0..2_000 {
         let t = 0.5 * f64::from(k);
         let at_m = instruments.map_position_m(s.distance_m);
+        let grade_frac = match t {
+            168.0..180.0 => -0.008,
+            0.0..200.0 => 0.025,
+            _ => -0.07,
+        };
         let patch = RoadPatch {
-            grade_rad: 0.002 * (at_m / 90.0).sin() + if t < 200.0 { 0.025 } else { -0.07 },
+            grade_rad: 0.002 * (at_m / 90.0).sin() + grade_frac,
             altitude_m: 2_800.0,
             air_temperature_k: 318.0,
             ..RoadPatch::default()

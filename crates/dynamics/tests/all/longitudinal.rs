@@ -256,6 +256,59 @@ fn the_lag_of_boost_comes_over_the_band_that_the_truck_file_gives() {
     assert_eq!(soft.lag_s(1_000.0, 500.0, 2_000.0), 0.1);
 }
 
+/// Full load falls with hot coolant as the controller follows it: `loss (1 - exp(-t / tau))` of what it is
+/// too hot by, at once without a lag.
+#[test]
+fn full_load_follows_hot_coolant_with_the_controllers_lag() {
+    let engine = |lag_s: f64| {
+        let mut p = TruckParameters::load("reference").unwrap();
+        for (path, value) in [
+            ("engine.derate_coolant_k", 368.0),
+            ("engine.derate_coolant_1_k", 0.01),
+            ("engine.derate_coolant_lag_s", lag_s),
+        ] {
+            p = p.with_parameter(path, value).unwrap();
+        }
+        Engine::new(p.engine).unwrap()
+    };
+    let left = |lag_s: f64, coolant_k: f64, after_s: f64| {
+        let (e, dt_s) = (engine(lag_s), 0.005);
+        let mut overheat_k = 0.0;
+        for _ in 0..(after_s / dt_s) as usize {
+            overheat_k = e.overheat_step_k(overheat_k, coolant_k, dt_s);
+        }
+        e.full_load_at_nm(120.0, 0.0, 293.0, overheat_k) / e.full_load_at_nm(120.0, 0.0, 293.0, 0.0)
+    };
+    assert!((left(20.0, 378.0, 20.0) - (1.0 - 0.1 * (1.0 - (-1.0_f64).exp()))).abs() < 1e-4);
+    assert!((left(0.0, 378.0, 0.005) - 0.9).abs() < 1e-12);
+    assert_eq!(left(20.0, 367.0, 20.0), 1.0);
+}
+
+/// A retarder that holds a truck on descents does so with a released pedal, where it is steep enough,
+/// and never pushes a truck that stands.
+#[test]
+fn a_retarder_of_descents_holds_on_descents_alone() {
+    let m = changed(
+        20_000.0,
+        &[
+            ("driveline.hidden_retarder_downhill_nm", 1_000.0),
+            ("driveline.hidden_retarder_from_descent_frac", 0.02),
+        ],
+    );
+    let held_n = |grade: f64, pedal_frac: f64, speed_m_s: f64| {
+        let s = m.initial_state(0.0, 0.0, 0.0, speed_m_s);
+        run(&m, &s, &pedal(pedal_frac), &on_grade(grade), 0.1).forces.retarder_n
+    };
+    let full_n = m.parameters().driveline.shaft_force_n(1_000.0);
+    assert!((held_n(-0.03, 0.0, 20.0) / full_n - 1.0).abs() < 1e-9);
+    for (grade, pedal_frac, speed_m_s) in
+        [(-0.03, 0.3, 20.0), (-0.01, 0.0, 20.0), (0.03, 0.0, 20.0), (-0.03, 0.0, 0.0)]
+    {
+        let held = held_n(grade, pedal_frac, speed_m_s);
+        assert!(held < 0.1 * full_n, "{grade} {pedal_frac} {speed_m_s}: {held}");
+    }
+}
+
 /// After a long descent discs that are held hot warm the linings by `1 - exp(-t/tau)`; without a lag
 /// linings are as hot as the discs.
 #[test]
