@@ -7,7 +7,8 @@ use super::{Hat, Problem};
 use crate::replay::Module;
 use crate::replay::signal::{SIGNALS, means};
 
-/// Part of the rows below the first and above the last knot.
+/// Part of the rows below the first and above the last knot, of those where the signal is not at rest:
+/// brakes act in one row of twenty.
 const TAIL: f64 = 0.02;
 
 /// A signal over the rows of a module.
@@ -48,7 +49,7 @@ impl Problem<'_> {
         let drives = self.drives.iter().zip(&values);
         let mut valid: Vec<f64> = drives
             .flat_map(|(d, x)| x.iter().zip(&d.valid[module as usize]))
-            .filter(|(x, ok)| **ok && x.is_finite())
+            .filter(|(x, ok)| **ok && x.is_finite() && **x != 0.0)
             .map(|(x, _)| *x)
             .collect();
         valid.sort_by(f64::total_cmp);
@@ -65,5 +66,41 @@ impl Problem<'_> {
             known.insert(key, places.clone());
         }
         places
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use dynamics::TruckParameters;
+
+    use super::*;
+    use crate::replay::Prepared;
+    use crate::replay::signal::signal;
+    use crate::replay::tests::recorded;
+    use crate::{Channel, Plant, Serial};
+
+    /// The knots stood where rows are, and brakes act in few: half of all braking lay beyond the last one,
+    /// so that a brake that is weaker at high pressure was patched by a retarder.
+    #[test]
+    fn knots_lie_where_a_signal_is_not_at_rest() {
+        let truck = TruckParameters::load("reference").unwrap();
+        let plant = Plant::of_truck(&truck).unwrap();
+        let mut drive = recorded(&truck, 16_000.0);
+        let count = drive.get(Channel::SpeedMS).unwrap().len();
+        let braked = |i: usize| {
+            if (i / 60).is_multiple_of(12) { 20.0 + (i / 720 % 6) as f64 * 20.0 } else { 0.0 }
+        };
+        drive.set(Channel::BrakePressureKpa, (0..count).map(braked).collect());
+        let drives = vec![Prepared::new(&drive, &plant)];
+        let problem = Problem::learn(&plant, drives, false, &Serial).unwrap();
+        let pressure = signal("brake_pressure_kpa").unwrap();
+        let [low, high] = problem.ends(Module::Force, pressure);
+        let d = &problem.drives[0];
+        let rows = means(d, &SIGNALS[pressure], Module::Force).into_iter();
+        let valid = rows.zip(&d.valid[Module::Force as usize]).filter(|(_, ok)| **ok);
+        let (resting, acting): (Vec<f64>, Vec<f64>) = valid.map(|x| x.0).partition(|x| *x == 0.0);
+        let beyond = acting.iter().filter(|x| **x > high).count();
+        assert!(low > 0.0 && resting.len() > acting.len(), "{low}: else the test tells nothing");
+        assert!(beyond * 20 < acting.len(), "{beyond} of {} beyond {high} kPa", acting.len());
     }
 }

@@ -193,8 +193,9 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.0,
     )
     .along(&[Open("engine_speed_rpm"), Fitted("engine_torque_percent")]),
+    // Axles begin to brake at pressures of their own, and a lining's friction falls with it or rises.
     h("brake_gain", &[P::BrakeGain], &[], ONE, WITH_PRESSURE, 0.05, 0.0)
-        .along(&[Open("brake_pressure_kpa")]),
+        .along(&[Made("brake_pressure_kpa")]),
     h(
         "brake_fade",
         &[P::Fade],
