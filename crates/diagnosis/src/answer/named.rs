@@ -127,7 +127,7 @@ pub(crate) fn causes(
     bare: &[Shape],
 ) -> Answer {
     let (evidence, zero) = (problem.evidence(), &problem.reference.theta);
-    let (theta, variances) = (evidence.on_the_whole(fit), evidence.variances(fit));
+    let variances = evidence.variances(fit);
     // Free functions beside all causes: a function in the place of one competes with these, too.
     let left = beyond(problem, &Point::of(fit));
     let firm: Vec<f64> = left.iter().map(|s| s.firm).collect();
@@ -151,16 +151,16 @@ pub(crate) fn causes(
         for (j, p) in fit.free.iter().enumerate() {
             if hyp.params().any(|q| q == *p) {
                 let s = p.spec();
-                let x = p.of_truck(&theta, zero);
+                let x = p.of_truck(&fit.theta, zero);
                 let sigma = variances[j].sqrt();
                 let value = if s.is_factor() { 1.0 + x } else { x };
                 parameters.insert(s.key, Parameter { value, sigma, unit: s.unit });
             }
         }
-        let size = hyp.size(&theta, zero);
+        let size = hyp.size(&fit.theta, zero);
         let sigma = {
             let of = |p: &P| {
-                let x = theta[*p as usize] - zero[*p as usize];
+                let x = fit.theta[*p as usize] - zero[*p as usize];
                 parameters.get(p.spec().key).map_or(0.0, |q: &Parameter| x * q.sigma)
             };
             hyp.sizes.iter().map(of).map(|x| x * x).sum::<f64>().sqrt() / size.abs().max(1e-12)

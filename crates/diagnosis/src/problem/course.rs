@@ -216,30 +216,6 @@ impl Course {
         }
         gram.marginal(keep, &between, &along)
     }
-
-    /// What the courses that all drives share add to the sizes on the whole, in each direction of a
-    /// Gram matrix at `theta`: the multiple of the catalogue's law that comes nearest to the cause with its
-    /// course as the drives have it (best linear prediction: Robinson, Stat. Sci. 6, 1991).
-    pub(crate) fn on_the_whole(
-        &self,
-        gram: &Gram,
-        theta: &Theta,
-        zero: &Theta,
-    ) -> Option<Vec<f64>> {
-        let (information, _, _) = gram.sum(|_| true);
-        let all: Vec<usize> = (0..=information.nrows()).collect();
-        let (_, pull, _) = self.taken_out(gram, &all, theta, zero)?.total();
-        let mut out = vec![0.0; information.nrows()];
-        for e in self.0.iter().filter(|e| !of_drive(e.of)) {
-            let own = e.column - 1;
-            let per = information[(own, own)].max(f64::MIN_POSITIVE);
-            let hats = e
-                .hats(gram, e.size(theta, zero))
-                .map(|(j, sigma)| sigma * sigma * pull[j - 1] * information[(own, j - 1)] / per);
-            out[own] += hats.sum::<f64>();
-        }
-        Some(out)
-    }
 }
 
 /// A point with the courses of the causes that are there: where what is left over is judged.

@@ -3,7 +3,7 @@
 //! demand.
 //!
 //! With the lag `tau(T) = tau_0 + b (T - T_0)` the torque follows `T' = (D - T) / tau(T)`. With
-//! `y = ln((D - T_0) / (D - T))`, the part of the gap that is gone, time is
+//! `y = ln((D - T_0) / (D - T))` time is
 //! `t(y) = (tau_0 + b g) y - b g (1 - exp(-y))`, `g = D - T_0`.
 
 use crate::Drive;

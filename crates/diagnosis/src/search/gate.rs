@@ -4,7 +4,6 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::causes::hypothesis::CATALOGUE;
-use crate::causes::param::Theta;
 use crate::problem::Direction;
 use crate::problem::course::Course;
 use crate::problem::stats::evidence::posterior;
@@ -24,12 +23,6 @@ fn from_one_drive(fit: &Fit, fewer: &Fit) -> bool {
     let gains: Vec<f64> = drives.map(|(with, less)| 0.5 * (less[(0, 0)] - with[(0, 0)])).collect();
     let most = gains.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     gains.len() > 2 && gains.iter().sum::<f64>() - most < -STRONG_NATS
-}
-
-/// The courses of a fit as sizes are stated.
-fn open(fit: &Fit) -> Course {
-    let mut along = directions(&fit.free, &fit.theta);
-    Course::of(&fit.sizes(), &mut along).stated()
 }
 
 impl dyn Evidence + '_ {
@@ -52,21 +45,11 @@ impl dyn Evidence + '_ {
     /// Covariance with the courses as widely open as sizes are stated ([`Course::stated`]).
     fn stated(&self, fit: &Fit) -> Option<DMatrix<f64>> {
         let keep: Vec<usize> = (0..=fit.free.len()).collect();
-        let gram = open(fit).taken_out(&fit.whole, &keep, &fit.theta, self.zero())?;
+        let mut along = directions(&fit.free, &fit.theta);
+        let course = Course::of(&fit.sizes(), &mut along).stated();
+        let gram = course.taken_out(&fit.whole, &keep, &fit.theta, self.zero())?;
         let sigma: Vec<f64> = fit.priors.iter().map(|p| p.sigma).collect();
         posterior(&gram.total().0, &sigma).map(|(covariance, _)| covariance)
-    }
-
-    /// Where a fit has its parameters once what the courses add to the sizes is counted to these
-    /// ([`Course::on_the_whole`]).
-    pub(crate) fn on_the_whole(&self, fit: &Fit) -> Theta {
-        let mut theta = fit.theta;
-        let more = open(fit).on_the_whole(&fit.whole, &fit.theta, self.zero());
-        for (p, more) in fit.free.iter().zip(more.into_iter().flatten()) {
-            let (s, i) = (p.spec(), *p as usize);
-            theta[i] = (theta[i] + more).clamp(self.zero()[i] + s.lo, self.zero()[i] + s.hi);
-        }
-        theta
     }
 
     /// Over-dispersion of the drives about every free parameter.

@@ -9,7 +9,7 @@ use crate::support::random::normal;
 use crate::support::{Campaign, generate, second};
 use diagnosis::{
     Baseline, Channel as C, Diagnosis, DiagnosisError, DriveSet, Options, Plant, Serial, Verdict,
-    diagnose_with,
+    diagnose_with, extend,
 };
 use dynamics::TruckParameters;
 use rand::SeedableRng;
@@ -201,6 +201,34 @@ fn boost_that_comes_softly_is_explained_with_its_lag() {
         assert!((lag.value - size).abs() < 1.645 * lag.sigma, "{size} {lag:?}");
         assert!(width.value > 0.05, "{width:?}");
     }
+}
+
+/// Sizes were written once with what their courses add to them, which makes this truck's error 20 % larger,
+/// and the gain was that of the sizes without. A baseline's own mean of a factor is of second order.
+#[test]
+fn the_gain_is_that_of_the_truck_that_is_written() {
+    let four = Campaign { drives: 4, ..SHORT };
+    let hidden = [Effect::Cause { id: "engine_friction", size: 0.6, shape: Shape([0.9; 4]) }];
+    let set = second::generate(&hidden, &four, 33);
+    let order = second::generate(&[], &SHORT, 901);
+    let baseline = Baseline::learn(&plant(), &order, &Serial).unwrap();
+    let options = Options::default();
+    let d = diagnose_with(&plant(), &set, Some(&baseline), &options, &Serial, &mut |_| {});
+    let d = d.unwrap();
+    assert_eq!(named(&d), ["engine_friction"]);
+    let truck = TruckParameters::load("reference").unwrap();
+    let overlay = extend(&truck, "reference", "x", &d.causes, "test").overlay.unwrap();
+    let written = Plant::of_truck(&truck.with_overlay(&overlay).unwrap()).unwrap();
+    let gain = d.gain.unwrap();
+    let error_m_s = |of: &Plant| {
+        let held = set.drives.iter().filter(|x| gain.held_out.contains(&x.name));
+        baseline.speed_rmse_m_s(of, held)
+    };
+    let (before, after) = (gain.speed_rmse_m_s.before, gain.speed_rmse_m_s.after);
+    let (plain_m_s, written_m_s) = (error_m_s(&plant()), error_m_s(&written));
+    assert!((plain_m_s / before - 1.0).abs() < 1e-3, "{plain_m_s} {before}");
+    assert!((written_m_s / after - 1.0).abs() < 0.03, "{written_m_s} {after}");
+    assert!(after < 0.8 * before, "{before} {after}: else the test tells nothing");
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Which causes of a set stay, and which do not.
 
 use super::*;
-use crate::problem::course::HATS;
 
 const RETARDER: &str = "hidden_retarder";
 
@@ -88,26 +87,6 @@ fn more_load_than_the_sheet_says_lies_somewhere() {
     // farther than more load can lie, and without more load
     assert_eq!(named(0.14, 1.9).len(), 2);
     assert_eq!(named(0.0, 0.2), ["payload_position"]);
-}
-
-/// A friction that is 0.3 more at all speeds, and 1.6 times that where nearly all of it shows, was stated as
-/// what it is at any speed: its size is the multiple of the catalogue's law that comes nearest to it.
-#[test]
-fn a_size_counts_what_its_course_adds_on_the_whole() {
-    let law: Vec<f64> = (0..ROWS).map(|i| if i < 12 { 800.0 } else { 80.0 }).collect();
-    let knots = (ROWS - 1) as f64 / (HATS - 1) as f64;
-    let size = |i: usize| 0.3 * (1.0 + 0.6 * (1.0 - i as f64 / knots).max(0.0));
-    let effect: Vec<f64> = law.iter().enumerate().map(|(i, x)| size(i) * x).collect();
-    let along = |x: &[f64]| x.iter().zip(&law).map(|(a, b)| a * b).sum::<f64>();
-    let nearest = along(&effect) / along(&law);
-    let problem = alike(6, &effect, &[(P::Friction, law.clone())]);
-    let evidence: &dyn Evidence = &problem;
-    let (names, fit, _) = found(&problem, &["engine_friction"]);
-    assert_eq!(names, ["engine_friction"]);
-    let (alone, whole) = (fit.theta, evidence.on_the_whole(&fit));
-    let off = |theta: Theta| (theta[P::Friction as usize] - nearest).abs();
-    assert!(off(whole) < 0.01, "{} {nearest}", whole[P::Friction as usize]);
-    assert!(off(alone) > 0.05, "{}: else the test tells nothing", off(alone));
 }
 
 /// The interval of a derating, whose onset is fitted, missed those of other makers' controllers: along the
