@@ -8,12 +8,20 @@ fn truck(payload_kg: f64) -> TruckModel {
     TruckModel::new(TruckParameters::load("reference").unwrap(), payload_kg).unwrap()
 }
 
-fn changed(payload_kg: f64, changes: &[(&str, f64)]) -> TruckModel {
+fn parameters(changes: &[(&str, f64)]) -> TruckParameters {
     let mut p = TruckParameters::load("reference").unwrap();
     for (path, value) in changes {
         p = p.with_parameter(path, *value).unwrap();
     }
-    TruckModel::new(p, payload_kg).unwrap()
+    p
+}
+
+fn changed(payload_kg: f64, changes: &[(&str, f64)]) -> TruckModel {
+    TruckModel::new(parameters(changes), payload_kg).unwrap()
+}
+
+fn engine(changes: &[(&str, f64)]) -> Engine {
+    Engine::new(parameters(changes).engine).unwrap()
 }
 
 fn on_grade(grade_rad: f64) -> RoadPatch {
@@ -228,19 +236,15 @@ fn hot_brakes_fade_and_cool_again() {
 /// and at once where the band has no width.
 #[test]
 fn the_lag_of_boost_comes_over_the_band_that_the_truck_file_gives() {
-    let engine = |width_frac: f64| {
-        let mut p = TruckParameters::load("reference").unwrap();
-        for (path, value) in [
+    let of = |width_frac: f64| {
+        engine(&[
             ("engine.fast_lag_s", 0.1),
             ("engine.slow_lag_s", 0.9),
             ("engine.lag_threshold_frac", 0.4),
             ("engine.lag_width_frac", width_frac),
-        ] {
-            p = p.with_parameter(path, value).unwrap();
-        }
-        Engine::new(p.engine).unwrap()
+        ])
     };
-    let (soft, sudden) = (engine(0.2), engine(0.0));
+    let (soft, sudden) = (of(0.2), of(0.0));
     for (part, soft_s, sudden_s) in [
         (0.2, 0.1, 0.1),
         (0.3, 0.1, 0.1),
@@ -260,19 +264,15 @@ fn the_lag_of_boost_comes_over_the_band_that_the_truck_file_gives() {
 /// too hot by, at once without a lag.
 #[test]
 fn full_load_follows_hot_coolant_with_the_controllers_lag() {
-    let engine = |lag_s: f64| {
-        let mut p = TruckParameters::load("reference").unwrap();
-        for (path, value) in [
+    let of = |lag_s: f64| {
+        engine(&[
             ("engine.derate_coolant_k", 368.0),
             ("engine.derate_coolant_1_k", 0.01),
             ("engine.derate_coolant_lag_s", lag_s),
-        ] {
-            p = p.with_parameter(path, value).unwrap();
-        }
-        Engine::new(p.engine).unwrap()
+        ])
     };
     let left = |lag_s: f64, coolant_k: f64, after_s: f64| {
-        let (e, dt_s) = (engine(lag_s), 0.005);
+        let (e, dt_s) = (of(lag_s), 0.005);
         let mut overheat_k = 0.0;
         for _ in 0..(after_s / dt_s) as usize {
             overheat_k = e.overheat_step_k(overheat_k, coolant_k, dt_s);

@@ -193,7 +193,8 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.0,
     )
     .along(&[Open("engine_speed_rpm"), Fitted("engine_torque_percent")]),
-    // Axles begin to brake at pressures of their own, and a lining's friction falls with it or rises.
+    // Axles begin to brake at pressures of their own, and a lining's friction falls with it or rises: no
+    // data sheet says how far (a judgement, as of a fade's law).
     h("brake_gain", &[P::BrakeGain], &[], ONE, WITH_PRESSURE, 0.05, 0.0)
         .along(&[Made("brake_pressure_kpa")]),
     h(
