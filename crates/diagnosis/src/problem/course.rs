@@ -31,9 +31,12 @@ use dynamics::catalogue::Law;
 
 /// Hat functions along one signal.
 pub(crate) const HATS: usize = 4;
-/// Those of weather and of what wanders, over the time of a drive: they change within minutes (gusts of
-/// tens of seconds are noise, which drives in order have too).
-const OF_DRIVE: usize = 10;
+/// Those of weather, over the time of a drive: it changes within minutes (gusts of tens of seconds are
+/// noise, which drives in order have too).
+const OF_WEATHER: usize = 10;
+/// Those of what wanders, over the time of a drive: nothing says how fast it does, and what is left of a
+/// large offset between knots minutes apart is a wind's to explain.
+const OF_WANDER: usize = 40;
 
 /// Signals along which the course of a cause with this size may differ, those that drive it, and its
 /// standard deviation there.
@@ -65,6 +68,22 @@ fn rho(h: &Hypothesis, along: &Along) -> f64 {
 /// Is a size one of weather?
 fn weather(h: &Hypothesis) -> bool {
     h.course.iter().any(|along| matches!(along, Along::Weather(_)))
+}
+
+/// Does a size wander?
+fn wanders(h: &Hypothesis) -> bool {
+    h.course.iter().any(|along| matches!(along, Along::Wanders(_)))
+}
+
+/// Hat functions along each signal of a cause.
+fn count(h: &Hypothesis) -> usize {
+    if wanders(h) {
+        OF_WANDER
+    } else if weather(h) {
+        OF_WEATHER
+    } else {
+        HATS
+    }
 }
 
 /// Has every drive a course of its own?
@@ -102,13 +121,20 @@ impl Effect {
     /// A course is one of what shows of a cause: where the tolerances can take a cause (a headwind is
     /// almost a little more drag) but not its course, the course shows no more than the cause does.
     /// Else any cause would bring a free function along for what trucks in order leave, too. A size is
-    /// known no better than its form all the same.
-    fn hats<'a>(&'a self, gram: &'a Gram, size: f64) -> impl Iterator<Item = (usize, f64)> + 'a {
+    /// known no better than its form all the same. What wanders may do so `freely`: of a steering that
+    /// is off centre the tolerances take what is constant, and how it wanders is nearly all that shows.
+    fn hats<'a>(
+        &'a self,
+        gram: &'a Gram,
+        size: f64,
+        freely: bool,
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
         let shows = |j: usize| gram.per_drive.iter().map(|g| g[(j, j)]).sum::<f64>();
+        let in_full = self.stated || (freely && wanders(self.of));
         self.hats.iter().flat_map(move |(rho, hats)| {
             let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
             let shown = (shows(self.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-            let part = if self.stated { 1.0 } else { shown };
+            let part = if in_full { 1.0 } else { shown };
             hats.iter().map(move |j| (*j, rho * size * part))
         })
     }
@@ -134,7 +160,7 @@ impl Course {
             }
             let Some(of) = CATALOGUE.iter().find(|h| h.sizes.contains(&p)) else { continue };
             let mut hats = Vec::new();
-            let count = if of_drive(of) { OF_DRIVE } else { HATS };
+            let count = count(of);
             for (name, rho) in signals(p) {
                 let Some(signal) = signal(name) else { continue };
                 let first = directions.len() + 1;
@@ -197,8 +223,10 @@ impl Course {
         Self(self.0.iter().filter(|e| !sizes.contains(&e.p)).cloned().collect())
     }
 
-    /// The Gram matrix over the columns `keep` with these effects taken out, the sizes being those of
-    /// `theta` beyond `zero`. `None` where it is not positive definite.
+    /// The Gram matrix over the columns `keep`, the residual first, with these effects taken out, the
+    /// sizes being those of `theta` beyond `zero`. Whether what may wander does is for the drives to say: of
+    /// a steering that is off centre by the same all the time, a free course would cost more than it is
+    /// worth. `None` where it is not positive definite.
     pub(crate) fn taken_out(
         &self,
         gram: &Gram,
@@ -206,12 +234,28 @@ impl Course {
         theta: &Theta,
         zero: &Theta,
     ) -> Option<Gram> {
+        let held = self.taken_out_if(gram, keep, theta, zero, false);
+        if !self.0.iter().any(|e| wanders(e.of) && !e.stated) {
+            return held;
+        }
+        let free = self.taken_out_if(gram, keep, theta, zero, true);
+        [held, free].into_iter().flatten().min_by(|a, b| a.total().2.total_cmp(&b.total().2))
+    }
+
+    fn taken_out_if(
+        &self,
+        gram: &Gram,
+        keep: &[usize],
+        theta: &Theta,
+        zero: &Theta,
+        freely: bool,
+    ) -> Option<Gram> {
         let (mut between, mut along) = (Vec::new(), Vec::new());
         for e in &self.0 {
             let size = e.size(theta, zero);
             between.push((e.column, e.between() * size));
             let to = if of_drive(e.of) { &mut between } else { &mut along };
-            to.extend(e.hats(gram, size));
+            to.extend(e.hats(gram, size, freely));
             along.extend(e.brings.iter().map(|(per_unit, j)| (*j, per_unit * size)));
         }
         gram.marginal(keep, &between, &along)
@@ -257,7 +301,7 @@ mod tests {
         let sigma = course.deviations(directions.len(), &theta, &zero);
         assert_eq!(sigma[..2], [WEATHER * 5.0; 2]);
         assert_eq!(sigma[2], RHO * 0.1);
-        let hats = &sigma[3..3 + 2 * OF_DRIVE];
+        let hats = &sigma[3..3 + 2 * OF_WEATHER];
         assert!(hats.iter().all(|x| *x == WEATHER * 5.0), "{hats:?}");
     }
 

@@ -221,6 +221,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         1.0,
     )
     .along(&[Open("speed_m_s"), Open("time_s")]),
+    // What holds the truck while the foot is away need not do so by the same beside an engine brake.
     h(
         "hidden_retarder",
         &[P::RetarderCoast],
@@ -230,7 +231,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         100.0,
         1.0,
     )
-    .along(&[Open("speed_m_s"), Open("time_s")]),
+    .along(&[Open("speed_m_s"), Open("engine_brake_frac"), Open("time_s")]),
     h(
         "hidden_retarder",
         &[P::RetarderSlope],
@@ -240,7 +241,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         100.0,
         1.0,
     )
-    .along(&[Open("speed_m_s"), Open("time_s")]),
+    .along(&[Open("speed_m_s"), Open("engine_brake_frac"), Open("time_s")]),
     h("speed_scale", &[P::SpeedScale], &[], ONE, &[C::GpsSpeedMS], 0.004, 0.0)
         .along(&[Open("speed_m_s"), Open("time_s")]),
     h(
