@@ -14,7 +14,8 @@
 //!
 //! A wind has `w_k` of each drive for itself, over its time: weather swells and turns, and what blows
 //! aside of it goes with its whole length. So has what wanders within a drive (a steering that is off
-//! centre, a map that is shifted): a crosswind beside it would explain how it does.
+//! centre, a map that is shifted): a crosswind beside it would explain how it does. Whether it wanders is
+//! for the likelihood to say.
 //!
 //! (Kennedy and O'Hagan, J. R. Statist. Soc. B 63, 2001; here multiplicative.) What another cause
 //! would patch of the form of a large one is explained without it, and a size is known no better
