@@ -104,8 +104,8 @@ struct Effect {
     hats: Vec<(f64, Vec<usize>)>,
     /// What it brings along, with its deviation per unit of the size.
     brings: Vec<(f64, usize)>,
-    /// Its size is to be stated.
-    stated: bool,
+    /// Its course is not held to what shows of it.
+    in_full: bool,
 }
 
 impl Effect {
@@ -122,20 +122,13 @@ impl Effect {
     /// A course is one of what shows of a cause: where the tolerances can take a cause (a headwind is
     /// almost a little more drag) but not its course, the course shows no more than the cause does.
     /// Else any cause would bring a free function along for what trucks in order leave, too. A size is
-    /// known no better than its form all the same. What wanders may do so `freely`: of a steering that
-    /// is off centre the tolerances take what is constant, and how it wanders is nearly all that shows.
-    fn hats<'a>(
-        &'a self,
-        gram: &'a Gram,
-        size: f64,
-        freely: bool,
-    ) -> impl Iterator<Item = (usize, f64)> + 'a {
+    /// known no better than its form all the same.
+    fn hats<'a>(&'a self, gram: &'a Gram, size: f64) -> impl Iterator<Item = (usize, f64)> + 'a {
         let shows = |j: usize| gram.per_drive.iter().map(|g| g[(j, j)]).sum::<f64>();
-        let in_full = self.stated || (freely && wanders(self.of));
         self.hats.iter().flat_map(move |(rho, hats)| {
             let of_hats: f64 = hats.iter().map(|j| shows(*j)).sum();
             let shown = (shows(self.column) / of_hats.max(f64::MIN_POSITIVE)).min(1.0).sqrt();
-            let part = if in_full { 1.0 } else { shown };
+            let part = if self.in_full { 1.0 } else { shown };
             hats.iter().map(move |j| (*j, rho * size * part))
         })
     }
@@ -176,7 +169,7 @@ impl Course {
                 brings.push((*per_unit, directions.len() + 1));
                 directions.push(Direction::new(*brought, Vec::new(), brought.spec().step));
             }
-            out.push(Effect { p, of, column: j + 1, hats, brings, stated: false });
+            out.push(Effect { p, of, column: j + 1, hats, brings, in_full: false });
         }
         Self(out)
     }
@@ -212,10 +205,18 @@ impl Course {
     pub(crate) fn stated(&self) -> Self {
         let mut out = self.clone();
         for e in &mut out.0 {
-            e.stated = true;
+            e.in_full = true;
             let open = law(e.of);
             e.hats.iter_mut().for_each(|(rho, _)| *rho = rho.max(open));
         }
+        out
+    }
+
+    /// The same with what may wander free to do so: of a steering that is off centre the tolerances take
+    /// what is constant, and how it wanders is nearly all that shows.
+    fn freely(&self) -> Self {
+        let mut out = self.clone();
+        out.0.iter_mut().for_each(|e| e.in_full |= wanders(e.of));
         out
     }
 
@@ -235,28 +236,27 @@ impl Course {
         theta: &Theta,
         zero: &Theta,
     ) -> Option<Gram> {
-        let held = self.taken_out_if(gram, keep, theta, zero, false);
-        if !self.0.iter().any(|e| wanders(e.of) && !e.stated) {
+        let held = self.taken_out_as_is(gram, keep, theta, zero);
+        if !self.0.iter().any(|e| wanders(e.of) && !e.in_full) {
             return held;
         }
-        let free = self.taken_out_if(gram, keep, theta, zero, true);
+        let free = self.freely().taken_out_as_is(gram, keep, theta, zero);
         [held, free].into_iter().flatten().min_by(|a, b| a.total().2.total_cmp(&b.total().2))
     }
 
-    fn taken_out_if(
+    fn taken_out_as_is(
         &self,
         gram: &Gram,
         keep: &[usize],
         theta: &Theta,
         zero: &Theta,
-        freely: bool,
     ) -> Option<Gram> {
         let (mut between, mut along) = (Vec::new(), Vec::new());
         for e in &self.0 {
             let size = e.size(theta, zero);
             between.push((e.column, e.between() * size));
             let to = if of_drive(e.of) { &mut between } else { &mut along };
-            to.extend(e.hats(gram, size, freely));
+            to.extend(e.hats(gram, size));
             along.extend(e.brings.iter().map(|(per_unit, j)| (*j, per_unit * size)));
         }
         gram.marginal(keep, &between, &along)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector};
 
 use super::signals::Line;
-use super::{Direction, Problem, Rest, rows};
+use super::{Direction, Problem, Rest};
 use crate::causes::param::Theta;
 use crate::outside::unknown::KNOTS;
 use crate::problem::stats::slow::State;
@@ -171,9 +171,9 @@ impl Problem<'_> {
         let mut z = vec![0.0; touched * KNOTS];
         let count = rest.whitened[m].len().min(places.len());
         // Sums over the blocks of slow noise.
-        let block = whitener.slow.as_ref().map_or(1, |s| s.block);
-        let weights = whitener.slow.as_ref().map(|_| whitener.weights(rows(&self.drives[i], m)));
-        let weights = weights.as_deref().unwrap_or_default();
+        let slow = self.slow[i][m].as_ref();
+        let block = slow.map_or(1, |s| s.block);
+        let weights = slow.map_or(&[][..], |s| &s.weights);
         let mut sums = vec![[0.0; KNOTS]; weights.len().div_ceil(block)];
         for k in 0..count {
             let Some((left, sizes)) = places[k] else { continue };
@@ -203,11 +203,11 @@ impl Problem<'_> {
                 (low..=high).for_each(|a| sums[a] += w * hat[a]);
             }
         }
-        if let Some(slow) = &whitener.slow {
+        if let Some(slow) = slow {
             let mut states = [State::default(); KNOTS];
-            for (sums, gain) in sums.iter().zip(slow.gains(weights)) {
+            for (sums, gain) in sums.iter().zip(&slow.gains) {
                 let e: [f64; KNOTS] =
-                    core::array::from_fn(|a| states[a].innovation(&gain, gain.mean(sums[a])));
+                    core::array::from_fn(|a| states[a].innovation(gain, gain.mean(sums[a])));
                 for a in 0..KNOTS {
                     for b in a..KNOTS {
                         g[a][b] += gain.product((sums[a], e[a]), (sums[b], e[b]));

@@ -17,6 +17,7 @@ mod nuisance;
 mod random;
 mod signals;
 pub(crate) mod stats;
+mod white;
 
 pub(crate) use gram::Gram;
 pub(crate) use moved::moves;
@@ -35,6 +36,7 @@ use nalgebra::DMatrix;
 
 use crate::causes::param::{P, PARAMS, SPECS, Theta};
 use crate::problem::course::Point;
+use crate::problem::stats::slow::Over;
 use crate::problem::stats::whiten::{Rows, Whitener};
 use crate::replay::{GROUPS, MODULES, Module, Prepared, Residuals, replay_group};
 use crate::search::decisions::MEAN_PRIOR;
@@ -74,6 +76,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) drives: Vec<Prepared>,
     pub(crate) reference: Reference,
     nuisance: Vec<Nuisance>,
+    /// Slow noise over the rows of every drive, per module.
+    slow: Vec<[Option<Over>; MODULES]>,
     /// Information of every drive about the means of the tolerances.
     common: Arc<Vec<DMatrix<f64>>>,
     kept: Vec<Kept>,
@@ -218,6 +222,7 @@ impl<'a> Problem<'a> {
             drives,
             reference,
             nuisance: Vec::new(),
+            slow: Vec::new(),
             common: Arc::default(),
             kept,
             shifts,

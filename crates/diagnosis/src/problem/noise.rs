@@ -95,8 +95,14 @@ impl Problem<'_> {
         let of = |m: &Module| {
             let i = *m as usize;
             let (w, mut sums) = (&self.reference.whiteners[i], [0.0; 3]);
-            for (d, r) in self.drives.iter().zip(&left).filter(|(d, _)| d.available[i]) {
-                let both = [w.apply(&r[i], &d.valid[i]), w.whiten(&r[i], rows(d, i))];
+            for (at, (d, r)) in self.drives.iter().zip(&left).enumerate() {
+                if !d.available[i] {
+                    continue;
+                }
+                let both = [
+                    w.apply(&r[i], &d.valid[i]),
+                    w.whiten(&r[i], &d.valid[i], self.slow[at][i].as_ref()),
+                ];
                 let chunks = |k: usize| both[k].chunks_exact(rows_of_a_sum);
                 let ok = d.valid[i].chunks_exact(rows_of_a_sum);
                 for ((a, b), ok) in chunks(0).zip(chunks(1)).zip(ok) {

@@ -5,6 +5,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::signals::Line;
+use super::white::White;
 use super::{Problem, inner, nuisance_directions, rows};
 use crate::DiagnosisError;
 use crate::problem::course::Point;
@@ -71,6 +72,10 @@ impl Problem<'_> {
     pub(super) fn rebuild(&mut self, changed: Changed) -> Result<(), DiagnosisError> {
         if changed != Changed::Scatter {
             self.kept.iter().for_each(super::signals::Kept::renew);
+            let over = |i: usize| {
+                core::array::from_fn(|m| self.reference.whiteners[m].over(rows(&self.drives[i], m)))
+            };
+            self.slow = self.each(over);
         }
         self.shifts.iter().for_each(super::moved::Shifts::renew);
         let directions = nuisance_directions(&self.reference.tolerance);
@@ -154,14 +159,8 @@ impl Problem<'_> {
         let tolerances: Vec<DVector<f64>> = lines.iter().map(|l| self.against(i, l)).collect();
         let mut adjoint: [Vec<(usize, Vec<f64>)>; MODULES] = Default::default();
         for (j, line) in lines.iter().enumerate() {
-            for signals in line {
-                for (m, w) in signals.group.modules().iter().zip(self.white(i, signals)) {
-                    if !w.is_empty() {
-                        let m = *m as usize;
-                        let rows = rows(&self.drives[i], m);
-                        adjoint[m].push((j, self.reference.whiteners[m].adjoint(w, rows)));
-                    }
-                }
+            for (m, white) in line.iter().flat_map(|signals| self.whites(i, signals)) {
+                adjoint[m].push((j, self.through_adjoint(i, m, white)));
             }
         }
         Rest {
@@ -185,11 +184,8 @@ impl Problem<'_> {
             let columns = nuisance.columns.iter().chain(&rest.lines[1..]);
             let mut left = rest.whitened.clone();
             for ((line, sigma), z) in columns.zip(&sigma).zip(z.iter()) {
-                for signals in line {
-                    for (m, c) in signals.group.modules().iter().zip(self.white(i, signals)) {
-                        let left = left[*m as usize].iter_mut();
-                        left.zip(c).for_each(|(x, c)| *x -= z * sigma * c);
-                    }
+                for (m, white) in line.iter().flat_map(|signals| self.whites(i, signals)) {
+                    white.add_to(&mut left[m], -z * sigma, self.slow[i][m].as_ref());
                 }
             }
             left.map(|x| inner(&x, &x))
@@ -222,6 +218,12 @@ impl Problem<'_> {
         information.cholesky().map_or_else(|| DVector::zeros(q + w), |f| f.solve(&gradient))
     }
 
+    /// A whitened record of module `m` through the adjoint of its filter.
+    fn through_adjoint(&self, i: usize, m: usize, white: &White) -> Vec<f64> {
+        let whitener = &self.reference.whiteners[m];
+        whitener.adjoint(self.written_out(i, m, white), self.slow[i][m].as_ref())
+    }
+
     /// The tolerances' columns in module `m` of drive `i` through the adjoint of its filter.
     pub(super) fn adjoint(&self, i: usize, m: usize) -> &Adjoint {
         self.nuisance[i].adjoint[m].get_or_init(|| {
@@ -229,16 +231,12 @@ impl Problem<'_> {
             let mut columns = Vec::new();
             let mut filtered: Vec<Vec<f64>> = Vec::new();
             for (j, (line, sigma)) in nuisance.columns.iter().zip(&nuisance.sigma).enumerate() {
-                for signals in line {
-                    for (at, c) in signals.group.modules().iter().zip(self.white(i, signals)) {
-                        if *at as usize == m && !c.is_empty() {
-                            let mut back =
-                                self.reference.whiteners[m].adjoint(c, rows(&self.drives[i], m));
-                            back.iter_mut().for_each(|x| *x *= sigma);
-                            columns.push(j);
-                            filtered.push(back);
-                        }
-                    }
+                let whites = line.iter().flat_map(|signals| self.whites(i, signals));
+                for (_, white) in whites.filter(|(at, _)| *at == m) {
+                    let mut back = self.through_adjoint(i, m, white);
+                    back.iter_mut().for_each(|x| *x *= sigma);
+                    columns.push(j);
+                    filtered.push(back);
                 }
             }
             let rows = filtered.iter().map(Vec::len).max().unwrap_or(0);

@@ -2,11 +2,11 @@
 //! does not see the parameters of the others, so what has been replayed once serves wherever only
 //! those of other groups have moved.
 
-use core::ops::Range;
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
-use super::{Direction, Problem, inner, moves, rows};
+use super::white::{Part, White};
+use super::{Direction, Problem, moves};
 use crate::causes::param::{SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
 
@@ -17,10 +17,8 @@ pub(super) struct Signals {
     /// A residual rather than a sensitivity: clipped when whitened.
     residual: bool,
     /// Per module of the group; empty where it is not available.
-    raw: Arc<Vec<Vec<f64>>>,
-    whitened: OnceLock<Vec<Vec<f64>>>,
-    /// Per module, where the whitened rows are not zero: a hat over time is so in a part of a drive.
-    reach: OnceLock<Vec<Range<usize>>>,
+    raw: Arc<Vec<Part>>,
+    whitened: OnceLock<Vec<White>>,
     /// Inner products with the sensitivities to the drive's tolerances.
     products: OnceLock<Vec<f64>>,
 }
@@ -48,15 +46,8 @@ struct Store {
 const CLIP: f64 = 1e3;
 
 impl Signals {
-    fn new(group: Group, residual: bool, raw: Arc<Vec<Vec<f64>>>) -> Self {
-        Self {
-            group,
-            residual,
-            raw,
-            whitened: OnceLock::new(),
-            reach: OnceLock::new(),
-            products: OnceLock::new(),
-        }
+    fn new(group: Group, residual: bool, raw: Arc<Vec<Part>>) -> Self {
+        Self { group, residual, raw, whitened: OnceLock::new(), products: OnceLock::new() }
     }
 
     /// The same, to be whitened again.
@@ -66,15 +57,13 @@ impl Signals {
 
     /// What it changes by to `other` per `scale`, as a sensitivity.
     pub(super) fn change_to(&self, other: &Self, scale: f64) -> Arc<Self> {
-        let of = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
-            a.iter().zip(b).map(|(a, b)| (b - a) / scale).collect()
-        };
-        let raw = self.raw.iter().zip(other.raw.iter()).map(of).collect();
+        let both = self.raw.iter().zip(other.raw.iter());
+        let raw = both.map(|(a, b)| a.change_to(b, scale)).collect();
         Arc::new(Self::new(self.group, false, Arc::new(raw)))
     }
 
     fn samples(&self) -> usize {
-        self.raw.iter().map(Vec::len).sum()
+        self.raw.iter().map(|part| part.rows.len()).sum()
     }
 }
 
@@ -132,7 +121,7 @@ impl Problem<'_> {
     pub(crate) fn raw(&self, i: usize, module: Module, theta: &Theta) -> Vec<f64> {
         let of = |group: &Group| {
             let at = group.modules().iter().position(|m| *m == module)?;
-            self.point(i, *group, theta).raw.get(at).cloned()
+            self.point(i, *group, theta).raw.get(at).map(|part| part.rows.clone())
         };
         GROUPS.iter().find_map(of).unwrap_or_default()
     }
@@ -152,9 +141,9 @@ impl Problem<'_> {
     pub(super) fn column(module: Module, rows: Vec<f64>) -> Line {
         let of = |group: &&Group| group.modules().contains(&module);
         let line = GROUPS.iter().find(of).map(|group| {
-            let mut raw = vec![Vec::new(); group.modules().len()];
+            let mut raw = vec![Part::default(); group.modules().len()];
             if let Some(at) = group.modules().iter().position(|m| *m == module) {
-                raw[at] = rows;
+                raw[at] = Part::whole(rows);
             }
             Arc::new(Signals::new(*group, false, Arc::new(raw)))
         });
@@ -183,11 +172,12 @@ impl Problem<'_> {
         if let Some(kept) = self.kept[i].get(&key) {
             return kept;
         }
-        let raw = if let Some(hat) = direction.hat {
+        let raw: Vec<Part> = if let Some(hat) = direction.hat {
             let whole = Direction { hat: None, ..direction.clone() };
             let whole = self.sensitivity(i, group, theta, &whole);
             let modules = group.modules().iter().zip(whole.raw.iter());
-            modules.map(|(m, rows)| self.under_hat(i, *m, hat, rows)).collect()
+            let of = |(m, part): (&Module, &Part)| self.under_hat(i, *m, hat, &part.rows);
+            modules.map(|x| Part::acting(&of(x))).collect()
         } else if let Some(offset) = offset_of(direction.p).filter(|o| group.modules().contains(o))
         {
             let d = &self.drives[i];
@@ -200,7 +190,7 @@ impl Problem<'_> {
                     Vec::new()
                 }
             };
-            group.modules().iter().map(of).collect()
+            group.modules().iter().map(of).map(Part::whole).collect()
         } else {
             t[direction.p as usize] += direction.step;
             let mut moved = self.replay_one(i, group, &t);
@@ -211,7 +201,8 @@ impl Problem<'_> {
             } else {
                 (self.point(i, group, theta).raw.clone(), direction.step)
             };
-            for (x, b) in moved.iter_mut().flatten().zip(base.iter().flatten()) {
+            let base = base.iter().flat_map(|part| &part.rows);
+            for (x, b) in moved.iter_mut().flat_map(|part| &mut part.rows).zip(base) {
                 *x = (b - *x) / step;
             }
             moved
@@ -221,66 +212,60 @@ impl Problem<'_> {
         signals
     }
 
-    fn replay_one(&self, i: usize, group: Group, theta: &Theta) -> Vec<Vec<f64>> {
+    fn replay_one(&self, i: usize, group: Group, theta: &Theta) -> Vec<Part> {
         let mut out = Residuals::default();
         replay_group(&self.drives[i], self.plant, theta, group, &mut out);
-        group.modules().iter().map(|m| core::mem::take(&mut out[*m as usize])).collect()
+        let of = |m: &Module| Part::whole(core::mem::take(&mut out[*m as usize]));
+        group.modules().iter().map(of).collect()
     }
 
     /// Whitened signals, per module of the group.
-    pub(super) fn white<'s>(&self, i: usize, signals: &'s Signals) -> &'s [Vec<f64>] {
+    pub(super) fn white<'s>(&self, i: usize, signals: &'s Signals) -> &'s [White] {
         signals.whitened.get_or_init(|| {
-            let modules = signals.group.modules().iter();
-            let of = |(m, raw): (&crate::replay::Module, &Vec<f64>)| {
-                if raw.is_empty() {
-                    return Vec::new();
-                }
-                let whitener = &self.reference.whiteners[*m as usize];
-                let mut w = whitener.whiten(raw, rows(&self.drives[i], *m as usize));
-                if signals.residual {
-                    for x in &mut w {
-                        *x = if x.is_finite() { x.clamp(-CLIP, CLIP) } else { CLIP };
-                    }
-                }
-                w
+            let of = |(m, raw): (&Module, &Part)| {
+                let m = *m as usize;
+                let (whitener, ok) = (&self.reference.whiteners[m], &self.drives[i].valid[m]);
+                let clip = signals.residual.then_some(CLIP);
+                White::of(raw, whitener, ok, self.slow[i][m].as_ref(), clip)
             };
-            modules.zip(signals.raw.iter()).map(of).collect()
+            signals.group.modules().iter().zip(signals.raw.iter()).map(of).collect()
         })
     }
 
     /// Whitened signals of a line by module; empty where it does not reach.
     pub(super) fn spread(&self, i: usize, line: &Line) -> [Vec<f64>; MODULES] {
         let mut out: [Vec<f64>; MODULES] = Default::default();
-        for signals in line {
-            for (m, w) in signals.group.modules().iter().zip(self.white(i, signals)) {
-                out[*m as usize].clone_from(w);
-            }
+        for (m, white) in line.iter().flat_map(|signals| self.whites(i, signals)) {
+            out[m] = self.written_out(i, m, white);
         }
         out
     }
 
-    /// Where whitened signals are not zero, per module of the group; by whole eights of rows, so that
-    /// sums of products have the bits that they have over all rows.
-    fn reach<'s>(&self, i: usize, signals: &'s Signals) -> &'s [Range<usize>] {
-        let of = |rows: &Vec<f64>| {
-            let acts = |x: &f64| *x != 0.0;
-            let from = rows.iter().position(acts).unwrap_or(rows.len());
-            let to = rows.iter().rposition(acts).map_or(0, |last| last + 1);
-            from - from % 8..to.next_multiple_of(8).min(rows.len())
-        };
-        signals.reach.get_or_init(|| self.white(i, signals).iter().map(of).collect())
+    /// Modules that signals reach with what is whitened there.
+    pub(super) fn whites<'s>(
+        &self,
+        i: usize,
+        signals: &'s Signals,
+    ) -> impl Iterator<Item = (usize, &'s White)> {
+        let modules = signals.group.modules().iter().map(|m| *m as usize);
+        modules.zip(self.white(i, signals)).filter(|(_, white)| !white.is_nothing())
+    }
+
+    /// All rows of a whitened record.
+    pub(super) fn written_out(&self, i: usize, m: usize, white: &White) -> Vec<f64> {
+        white.written_out(self.drives[i].valid[m].len(), self.slow[i][m].as_ref())
     }
 
     /// Inner product of two lines.
     pub(super) fn dot(&self, i: usize, a: &Line, b: &Line) -> f64 {
-        a.iter()
-            .flat_map(|a| b.iter().filter(|b| b.group == a.group).map(move |b| (a, b)))
-            .flat_map(|(a, b)| {
-                let rows = self.white(i, a).iter().zip(self.white(i, b));
-                rows.zip(self.reach(i, a).iter().zip(self.reach(i, b)))
-            })
-            .map(|((x, y), (p, q))| inner_where_both_act((x, p), (y, q)))
-            .sum()
+        let both =
+            a.iter().flat_map(|a| b.iter().filter(|b| b.group == a.group).map(move |b| (a, b)));
+        both.flat_map(|(a, b)| {
+            let modules = a.group.modules().iter().map(|m| self.slow[i][*m as usize].as_ref());
+            let whites = self.white(i, a).iter().zip(self.white(i, b));
+            whites.zip(modules).map(|((a, b), slow)| a.dot(b, slow))
+        })
+        .sum()
     }
 
     /// Inner products of a line with the sensitivities to the tolerances of the drive.
@@ -296,10 +281,4 @@ impl Problem<'_> {
         }
         out
     }
-}
-
-/// Inner product over the rows where both act.
-fn inner_where_both_act(x: (&[f64], &Range<usize>), y: (&[f64], &Range<usize>)) -> f64 {
-    let both = x.1.start.max(y.1.start)..x.1.end.min(y.1.end);
-    if both.is_empty() { 0.0 } else { inner(&x.0[both.clone()], &y.0[both]) }
 }

@@ -152,29 +152,74 @@ impl Slow {
         Filter { power: self.power, keep: MEMORY.map(|m| (-1.0 / m).exp()), covariance }
     }
 
-    /// The filter at every block of a record with these weights.
-    pub(crate) fn gains(&self, weights: &[f64]) -> Vec<Gain> {
+    /// The filter over a record with these weights.
+    pub(crate) fn over(&self, weights: Vec<f64>) -> Over {
         let mut filter = self.start();
-        weights.chunks(self.block).map(|w| filter.next(inner(w, w)).0).collect()
+        let gains = weights.chunks(self.block).map(|w| filter.next(inner(w, w)).0).collect();
+        Over { block: self.block, weights, gains }
+    }
+}
+
+/// The filter over the rows of a record.
+#[derive(Debug)]
+pub(crate) struct Over {
+    /// Rows of a block.
+    pub(crate) block: usize,
+    /// How much slow noise of one shows in every row.
+    pub(crate) weights: Vec<f64>,
+    /// The filter at every block.
+    pub(crate) gains: Vec<Gain>,
+}
+
+impl Over {
+    /// Blocks from one on: their weights and the filter there.
+    fn blocks(&self, from: usize) -> impl Iterator<Item = (&[f64], &Gain)> {
+        self.weights.chunks(self.block).zip(&self.gains).skip(from)
     }
 
-    /// Whitens `y`, zero where masked.
-    pub(crate) fn apply(&self, y: &mut [f64], weights: &[f64]) {
-        let mut state = State::default();
-        let blocks = y.chunks_mut(self.block).zip(weights.chunks(self.block));
-        for ((y, w), gain) in blocks.zip(self.gains(weights)) {
+    /// Whitens rows `y` from the block `from`, before which all are zero.
+    pub(crate) fn apply(&self, y: &mut [f64], from: usize, state: &mut State) {
+        for (y, (w, gain)) in y.chunks_mut(self.block).zip(self.blocks(from)) {
             let mean = gain.mean(inner(w, y));
-            let shift = gain.shrink * state.innovation(&gain, mean) - mean;
+            let shift = gain.shrink * state.innovation(gain, mean) - mean;
             y.iter_mut().zip(w).for_each(|(y, w)| *y += w * shift);
         }
     }
 
+    /// What the weights are times in every block from `from` on, where all rows are zero before they are
+    /// whitened.
+    pub(crate) fn shifts_after(&self, from: usize, state: &mut State) -> Vec<f64> {
+        let gains = self.gains.iter().skip(from);
+        gains.map(|gain| gain.shrink * state.innovation(gain, 0.0)).collect()
+    }
+
+    /// Sums of rows `y` from the block `from` on by their weights, per block.
+    pub(crate) fn sums(&self, y: &[f64], from: usize) -> Vec<f64> {
+        y.chunks(self.block).zip(self.blocks(from)).map(|(y, (w, _))| inner(w, y)).collect()
+    }
+
+    /// The same of the weights times a number in every block.
+    pub(crate) fn sums_of_shifts<'a>(
+        &'a self,
+        from: usize,
+        shifts: &'a [f64],
+    ) -> impl Iterator<Item = f64> + 'a {
+        shifts.iter().zip(self.gains.iter().skip(from)).map(|(s, gain)| s * gain.weight)
+    }
+
+    /// Adds `factor` times the weights times a number in every block from `from` on.
+    pub(crate) fn add_shifts(&self, to: &mut [f64], from: usize, shifts: &[f64], factor: f64) {
+        let to = to.chunks_mut(self.block).skip(from).zip(self.blocks(from));
+        for ((to, (w, _)), shift) in to.zip(shifts) {
+            to.iter_mut().zip(w).for_each(|(x, w)| *x += factor * shift * w);
+        }
+    }
+
     /// `x`, zero where masked, through the adjoint of the filter.
-    pub(crate) fn adjoint(&self, x: &mut [f64], weights: &[f64]) {
-        let gains = self.gains(weights);
+    pub(crate) fn adjoint(&self, x: &mut [f64]) {
         let mut after = [0.0; PROCESSES];
-        let blocks = x.chunks_mut(self.block).zip(weights.chunks(self.block)).zip(&gains);
-        for ((x, w), gain) in blocks.rev() {
+        let blocks = x.chunks_mut(self.block).zip(self.weights.chunks(self.block));
+        for ((x, w), gain) in blocks.zip(&self.gains).rev() {
             after.iter_mut().zip(&gain.keep).for_each(|(a, keep)| *a *= keep);
             if gain.weight == 0.0 {
                 continue;
@@ -263,7 +308,7 @@ mod tests {
                 for (y, w) in y.chunks(2000).zip(weights.chunks(2000)) {
                     *of += inner(w, y).powi(2) / inner(w, w);
                 }
-                slow.apply(&mut y, &weights);
+                slow.over(weights.clone()).apply(&mut y, 0, &mut State::default());
             }
             count += 8.0;
         }
@@ -275,8 +320,9 @@ mod tests {
     fn the_adjoint_is_that_of_the_filter() {
         let (slow, (x, weights), (y, _)) = (fitted(), record(7), record(8));
         let (mut forth, mut back) = (x.clone(), y.clone());
-        slow.apply(&mut forth, &weights);
-        slow.adjoint(&mut back, &weights);
+        let slow = slow.over(weights);
+        slow.apply(&mut forth, 0, &mut State::default());
+        slow.adjoint(&mut back);
         let (one, other) = (inner(&forth, &y), inner(&x, &back));
         assert!((one - other).abs() < 1e-9 * one.abs().max(1.0), "{one} {other}");
     }
@@ -285,12 +331,13 @@ mod tests {
     fn products_come_from_the_sums_of_blocks() {
         let (slow, (x, weights)) = (fitted(), record(9));
         let mut white = x.clone();
-        slow.apply(&mut white, &weights);
+        let over = slow.over(weights.clone());
+        over.apply(&mut white, 0, &mut State::default());
         let (mut state, mut product) = (State::default(), inner(&x, &x));
         let blocks = x.chunks(slow.block).zip(weights.chunks(slow.block));
-        for ((x, w), gain) in blocks.zip(slow.gains(&weights)) {
+        for ((x, w), gain) in blocks.zip(&over.gains) {
             let sum = inner(w, x);
-            let e = state.innovation(&gain, gain.mean(sum));
+            let e = state.innovation(gain, gain.mean(sum));
             product += gain.product((sum, e), (sum, e));
         }
         let direct = inner(&white, &white);

@@ -4,7 +4,7 @@
 //! alike to residuals and sensitivities, masked rows counting as zero: generalised least squares
 //! with an AR noise model, and with slow noise beside it ([`super::slow`]) where that was fitted.
 
-use super::slow::Slow;
+use super::slow::{Over, Slow, State};
 
 /// Rows of a record.
 #[derive(Debug, Clone, Copy)]
@@ -82,13 +82,18 @@ impl Whitener {
         Some(out)
     }
 
-    /// Whitened record, zero where masked.
-    pub(crate) fn whiten(&self, x: &[f64], rows: Rows<'_>) -> Vec<f64> {
-        let mut out = self.apply(x, rows.ok);
-        if let Some(slow) = &self.slow {
-            slow.apply(&mut out, &self.weights(rows));
+    /// Whitened record, zero where masked, with slow noise over its rows.
+    pub(crate) fn whiten(&self, x: &[f64], ok: &[bool], slow: Option<&Over>) -> Vec<f64> {
+        let mut out = self.apply(x, ok);
+        if let Some(slow) = slow {
+            slow.apply(&mut out, 0, &mut State::default());
         }
         out
+    }
+
+    /// Slow noise over the rows of a record.
+    pub(crate) fn over(&self, rows: Rows<'_>) -> Option<Over> {
+        self.slow.as_ref().map(|slow| slow.over(self.weights(rows)))
     }
 
     /// How much slow noise of one shows in every row that the coefficients have whitened.
@@ -122,11 +127,10 @@ impl Whitener {
 
     /// A whitened record through the adjoint of the filter: its product with any record that is
     /// zero where masked is that of the whitened ones. `x` is zero where masked.
-    pub(crate) fn adjoint(&self, x: &[f64], rows: Rows<'_>) -> Vec<f64> {
+    pub(crate) fn adjoint(&self, mut x: Vec<f64>, slow: Option<&Over>) -> Vec<f64> {
         let scale = 1.0 / self.sigma;
-        let mut x = x.to_vec();
-        if let Some(slow) = &self.slow {
-            slow.adjoint(&mut x, &self.weights(rows));
+        if let Some(slow) = slow {
+            slow.adjoint(&mut x);
         }
         let mut out = x.clone();
         for (lag, a) in self.coefficients.iter().enumerate() {
