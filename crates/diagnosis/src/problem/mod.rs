@@ -36,7 +36,7 @@ use nalgebra::DMatrix;
 
 use crate::causes::param::{P, PARAMS, SPECS, Theta};
 use crate::problem::course::Point;
-use crate::problem::stats::slow::Over;
+use crate::problem::stats::slow::SlowFilter;
 use crate::problem::stats::whiten::{Rows, Whitener};
 use crate::replay::{GROUPS, MODULES, Module, Prepared, Residuals, replay_group};
 use crate::search::decisions::MEAN_PRIOR;
@@ -77,7 +77,7 @@ pub(crate) struct Problem<'a> {
     pub(crate) reference: Reference,
     nuisance: Vec<Nuisance>,
     /// Slow noise over the rows of every drive, per module.
-    slow: Vec<[Option<Over>; MODULES]>,
+    slow: Vec<[Option<SlowFilter>; MODULES]>,
     /// Information of every drive about the means of the tolerances.
     common: Arc<Vec<DMatrix<f64>>>,
     kept: Vec<Kept>,

@@ -95,10 +95,8 @@ impl Problem<'_> {
         let of = |m: &Module| {
             let i = *m as usize;
             let (w, mut sums) = (&self.reference.whiteners[i], [0.0; 3]);
-            for (at, (d, r)) in self.drives.iter().zip(&left).enumerate() {
-                if !d.available[i] {
-                    continue;
-                }
+            let drives = self.drives.iter().zip(&left).enumerate();
+            for (at, (d, r)) in drives.filter(|(_, (d, _))| d.available[i]) {
                 let both = [
                     w.apply(&r[i], &d.valid[i]),
                     w.whiten(&r[i], &d.valid[i], self.slow[at][i].as_ref()),

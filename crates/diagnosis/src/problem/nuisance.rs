@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::signals::Line;
-use super::white::White;
+use super::white::Whitened;
 use super::{Problem, inner, nuisance_directions, rows};
 use crate::DiagnosisError;
 use crate::problem::course::Point;
@@ -219,7 +219,7 @@ impl Problem<'_> {
     }
 
     /// A whitened record of module `m` through the adjoint of its filter.
-    fn through_adjoint(&self, i: usize, m: usize, white: &White) -> Vec<f64> {
+    fn through_adjoint(&self, i: usize, m: usize, white: &Whitened) -> Vec<f64> {
         let whitener = &self.reference.whiteners[m];
         whitener.adjoint(self.written_out(i, m, white), self.slow[i][m].as_ref())
     }

@@ -5,7 +5,7 @@
 use std::collections::{HashMap, VecDeque};
 use std::sync::{Arc, Mutex, OnceLock};
 
-use super::white::{Part, White};
+use super::white::{Part, Whitened};
 use super::{Direction, Problem, moves};
 use crate::causes::param::{SPECS, Theta};
 use crate::replay::{GROUPS, Group, MODULES, Module, Residuals, affects, offset_of, replay_group};
@@ -18,7 +18,7 @@ pub(super) struct Signals {
     residual: bool,
     /// Per module of the group; empty where it is not available.
     raw: Arc<Vec<Part>>,
-    whitened: OnceLock<Vec<White>>,
+    whitened: OnceLock<Vec<Whitened>>,
     /// Inner products with the sensitivities to the drive's tolerances.
     products: OnceLock<Vec<f64>>,
 }
@@ -220,13 +220,13 @@ impl Problem<'_> {
     }
 
     /// Whitened signals, per module of the group.
-    pub(super) fn white<'s>(&self, i: usize, signals: &'s Signals) -> &'s [White] {
+    pub(super) fn white<'s>(&self, i: usize, signals: &'s Signals) -> &'s [Whitened] {
         signals.whitened.get_or_init(|| {
             let of = |(m, raw): (&Module, &Part)| {
                 let m = *m as usize;
                 let (whitener, ok) = (&self.reference.whiteners[m], &self.drives[i].valid[m]);
                 let clip = signals.residual.then_some(CLIP);
-                White::of(raw, whitener, ok, self.slow[i][m].as_ref(), clip)
+                Whitened::of(raw, whitener, ok, self.slow[i][m].as_ref(), clip)
             };
             signals.group.modules().iter().zip(signals.raw.iter()).map(of).collect()
         })
@@ -246,13 +246,13 @@ impl Problem<'_> {
         &self,
         i: usize,
         signals: &'s Signals,
-    ) -> impl Iterator<Item = (usize, &'s White)> {
+    ) -> impl Iterator<Item = (usize, &'s Whitened)> {
         let modules = signals.group.modules().iter().map(|m| *m as usize);
         modules.zip(self.white(i, signals)).filter(|(_, white)| !white.is_nothing())
     }
 
     /// All rows of a whitened record.
-    pub(super) fn written_out(&self, i: usize, m: usize, white: &White) -> Vec<f64> {
+    pub(super) fn written_out(&self, i: usize, m: usize, white: &Whitened) -> Vec<f64> {
         white.written_out(self.drives[i].valid[m].len(), self.slow[i][m].as_ref())
     }
 

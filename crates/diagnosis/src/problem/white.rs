@@ -5,7 +5,7 @@
 //! number a block, and products with them need no more than sums over blocks.
 
 use super::inner;
-use super::stats::slow::{Over, State};
+use super::stats::slow::{SlowFilter, State};
 use super::stats::whiten::Whitener;
 
 /// Rows of a record that is zero before and after them.
@@ -43,7 +43,7 @@ impl Part {
 
 /// A whitened record.
 #[derive(Debug, Default)]
-pub(super) struct White {
+pub(super) struct Whitened {
     /// Rows that are written out, from the first of a block, up to the last of one.
     from: usize,
     rows: Vec<f64>,
@@ -53,13 +53,13 @@ pub(super) struct White {
     sums: Vec<f64>,
 }
 
-impl White {
+impl Whitened {
     /// A record whitened, rows beyond `clip` cut there.
     pub(super) fn of(
         part: &Part,
         whitener: &Whitener,
         ok: &[bool],
-        slow: Option<&Over>,
+        slow: Option<&SlowFilter>,
         clip: Option<f64>,
     ) -> Self {
         if part.rows.is_empty() || part.from >= ok.len() {
@@ -90,7 +90,7 @@ impl White {
     }
 
     /// Inner product with another one of the same module.
-    pub(super) fn dot(&self, other: &Self, slow: Option<&Over>) -> f64 {
+    pub(super) fn dot(&self, other: &Self, slow: Option<&SlowFilter>) -> f64 {
         let end = |x: &Self| x.from + x.rows.len();
         let (from, to) = (self.from.max(other.from), end(self).min(end(other)));
         let mut out = 0.0;
@@ -112,7 +112,7 @@ impl White {
     }
 
     /// Adds `factor` times all rows to `to`.
-    pub(super) fn add_to(&self, to: &mut [f64], factor: f64, slow: Option<&Over>) {
+    pub(super) fn add_to(&self, to: &mut [f64], factor: f64, slow: Option<&SlowFilter>) {
         let rows = to.iter_mut().skip(self.from).zip(&self.rows);
         rows.for_each(|(x, own)| *x += factor * own);
         if let Some(slow) = slow {
@@ -122,7 +122,7 @@ impl White {
     }
 
     /// All `count` rows; none where the module has none.
-    pub(super) fn written_out(&self, count: usize, slow: Option<&Over>) -> Vec<f64> {
+    pub(super) fn written_out(&self, count: usize, slow: Option<&SlowFilter>) -> Vec<f64> {
         if self.rows.len() == count {
             return self.rows.clone();
         }
@@ -185,12 +185,12 @@ mod tests {
                 .iter()
                 .map(|acts| whitener.whiten(&record(acts.clone(), 0.1), &ok, over))
                 .collect();
-            let whites: Vec<White> = parts
+            let whites: Vec<Whitened> = parts
                 .iter()
                 .map(|acts| {
                     let part = Part::acting(&record(acts.clone(), 0.1));
                     assert_eq!(part.rows.len(), acts.len());
-                    White::of(&part, &whitener, &ok, over, None)
+                    Whitened::of(&part, &whitener, &ok, over, None)
                 })
                 .collect();
             assert!(whites[2].rows.len() < 100 && !whites[2].rows.is_empty());

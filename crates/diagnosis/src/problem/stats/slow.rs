@@ -153,16 +153,16 @@ impl Slow {
     }
 
     /// The filter over a record with these weights.
-    pub(crate) fn over(&self, weights: Vec<f64>) -> Over {
+    pub(crate) fn over(&self, weights: Vec<f64>) -> SlowFilter {
         let mut filter = self.start();
         let gains = weights.chunks(self.block).map(|w| filter.next(inner(w, w)).0).collect();
-        Over { block: self.block, weights, gains }
+        SlowFilter { block: self.block, weights, gains }
     }
 }
 
 /// The filter over the rows of a record.
 #[derive(Debug)]
-pub(crate) struct Over {
+pub(crate) struct SlowFilter {
     /// Rows of a block.
     pub(crate) block: usize,
     /// How much slow noise of one shows in every row.
@@ -171,7 +171,7 @@ pub(crate) struct Over {
     pub(crate) gains: Vec<Gain>,
 }
 
-impl Over {
+impl SlowFilter {
     /// Blocks from one on: their weights and the filter there.
     fn blocks(&self, from: usize) -> impl Iterator<Item = (&[f64], &Gain)> {
         self.weights.chunks(self.block).zip(&self.gains).skip(from)

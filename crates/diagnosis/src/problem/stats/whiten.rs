@@ -4,7 +4,7 @@
 //! alike to residuals and sensitivities, masked rows counting as zero: generalised least squares
 //! with an AR noise model, and with slow noise beside it ([`super::slow`]) where that was fitted.
 
-use super::slow::{Over, Slow, State};
+use super::slow::{Slow, SlowFilter, State};
 
 /// Rows of a record.
 #[derive(Debug, Clone, Copy)]
@@ -83,7 +83,7 @@ impl Whitener {
     }
 
     /// Whitened record, zero where masked, with slow noise over its rows.
-    pub(crate) fn whiten(&self, x: &[f64], ok: &[bool], slow: Option<&Over>) -> Vec<f64> {
+    pub(crate) fn whiten(&self, x: &[f64], ok: &[bool], slow: Option<&SlowFilter>) -> Vec<f64> {
         let mut out = self.apply(x, ok);
         if let Some(slow) = slow {
             slow.apply(&mut out, 0, &mut State::default());
@@ -92,7 +92,7 @@ impl Whitener {
     }
 
     /// Slow noise over the rows of a record.
-    pub(crate) fn over(&self, rows: Rows<'_>) -> Option<Over> {
+    pub(crate) fn over(&self, rows: Rows<'_>) -> Option<SlowFilter> {
         self.slow.as_ref().map(|slow| slow.over(self.weights(rows)))
     }
 
@@ -127,7 +127,7 @@ impl Whitener {
 
     /// A whitened record through the adjoint of the filter: its product with any record that is
     /// zero where masked is that of the whitened ones. `x` is zero where masked.
-    pub(crate) fn adjoint(&self, mut x: Vec<f64>, slow: Option<&Over>) -> Vec<f64> {
+    pub(crate) fn adjoint(&self, mut x: Vec<f64>, slow: Option<&SlowFilter>) -> Vec<f64> {
         let scale = 1.0 / self.sigma;
         if let Some(slow) = slow {
             slow.adjoint(&mut x);
