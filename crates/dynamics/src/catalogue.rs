@@ -216,7 +216,8 @@ pub static CATALOGUE: [Cause; 37] = [
         "the fan takes more power than modelled" / "the fan takes less power than modelled",
         [add("engine.fan_power_w", "W", 20_000.0, 0.0, 60_000.0)],
         [add("engine.fan_on_k", "K", 5.0, -14.0, 14.0),
-         add("engine.fan_hysteresis_k", "K", 3.0, 0.0, 12.0)]),
+         add("engine.fan_hysteresis_k", "K", 3.0, 0.0, 12.0),
+         add("engine.fan_band_k", "K", 3.0, 0.0, 12.0)]),
     cause!("dragging_brake", MissingPhysics, Physics,
         "a constant force holds the truck back: a dragging brake"
         / "a constant force holds the truck back: a dragging brake",

@@ -195,7 +195,7 @@ impl TruckModel {
             DynamicsError::OutOfBounds { name: p.name.clone(), violations: vec![e.to_string()] }
         })?;
         let idle = self.engine.idle_rad_s;
-        let holding = self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, false);
+        let holding = self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, 0.0);
         Ok(VehicleLimits {
             geometry: self.geometry(),
             powertrain: PowertrainLimits {

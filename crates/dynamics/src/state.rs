@@ -108,8 +108,8 @@ pub struct TruckState {
     pub coolant_k: f64,
     /// How far the engine's controller holds it to be too hot, K.
     pub overheat_k: f64,
-    /// The cooling fan runs.
-    pub fan_runs: bool,
+    /// How far the cooling fan is on, 0 to 1.
+    pub fan_on_frac: f64,
     /// Fuel used, g.
     pub fuel_g: f64,
     /// Fuel flow, g/s.

@@ -72,6 +72,7 @@ fn carry(id: &str, key: &str) -> Option<Carry> {
         ("driveline_loss", "mesh_loss_frac") => Plus("driveline.mesh_loss_frac", 1.0),
         ("fan_load", "fan_power_kw") => Plus("engine.fan_power_w", 1e3),
         ("fan_load", "coolant_start_offset_k") => Plus("engine.fan_on_k", 1.0),
+        ("fan_load", "band_k") => Plus("engine.fan_band_k", 1.0),
         ("fan_load", "hysteresis_k") => Plus("engine.fan_hysteresis_k", 1.0),
         ("mass" | "payload_position", "stiffness_follows_load") => Carry::Implied,
         ("dragging_brake", "force_n") => Plus("resistance.parasitic_force_n", 1.0),

@@ -97,10 +97,11 @@ pub(crate) enum P {
     MeshLoss,
     PedalLag,
     TurboWidth,
+    FanBand,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 86;
+pub(crate) const PARAMS: usize = 87;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -247,6 +248,8 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::PedalLag, "lag_frac", "1", (0.5, 0.0, 1.0, 0.1), 0.0, 0.0),
     // A turbocharger has its speed at once, or over a good part of the load.
     s(P::TurboWidth, "threshold_width_frac", "1", (0.15, 0.0, 0.6, 0.03), 0.0, 0.0),
+    // A viscous clutch comes over some kelvin, one of plates at once.
+    s(P::FanBand, "band_k", "K", (3.0, 0.0, 12.0, 0.5), 0.0, 0.0),
 ];
 
 impl Spec {

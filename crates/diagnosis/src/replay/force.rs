@@ -259,17 +259,18 @@ fn lining_heat(
     })
 }
 
-/// How far the fan is on: play between two thresholds, on above the start, off below it by the
-/// width.
+/// How far the fan is on: play between two ramps, coming over the band from the start on, going by
+/// the width below it. What switches comes over what a sensor resolves.
 fn fan(d: &Prepared, plant: &Plant, t: &Theta) -> Arc<[f64]> {
     let engine = &plant.truck.engine;
     let start = engine.fan_on_k - ZERO_DEGC_K + t[P::FanStart as usize];
     let width = engine.fan_hysteresis_k + t[P::FanWidth as usize];
-    d.profiles.get(Kind::Fan, [start, width], || {
+    let band = engine.fan_band_k + t[P::FanBand as usize];
+    d.profiles.get(Kind::Fan, [start, width, band], || {
         let mut on = 0.0_f64;
         let steps = d.coolant.iter().map(|coolant| {
-            let over = coolant - start;
-            let (low, high) = (step(over, 0.7), step(over + width, 0.7));
+            let over = coolant - start - 0.5 * band;
+            let (low, high) = (step(over, 0.7 + 0.5 * band), step(over + width, 0.7 + 0.5 * band));
             on = on.clamp(low, high);
             on
         });

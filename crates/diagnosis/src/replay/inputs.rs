@@ -85,7 +85,7 @@ impl Inputs {
             speed: of(&|i| d.speed[i]),
             indicated_nm: of(&|i| d.torque[i] * 0.01 * truck.engine.reference_torque_nm),
             friction_nm: of(&|i| engine.friction_nm(d.omega[i])),
-            auxiliary_nm: of(&|i| engine.auxiliary_nm(d.omega[i], false)),
+            auxiliary_nm: of(&|i| engine.auxiliary_nm(d.omega[i], 0.0)),
             per_w: of(&|i| engine.crank_nm(1.0, d.omega[i])),
             engine_brake_nm: of(&|i| d.engine_brake[i] * engine.engine_brake_nm(d.omega[i])),
             ratio_1_m: of(&|i| gear(i).0),

@@ -199,6 +199,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::EngineBrakeScale
         | P::SpeedLag
         | P::PressureLag
+        | P::FanBand
         | P::FanWidth => &[G::Force],
         P::WindX | P::WindY | P::Crosswind => &[G::Force, G::Lateral],
         P::Mass => &[G::Force, G::Lateral],

@@ -11,7 +11,7 @@ pub(super) enum Kind {
     Service,
     /// Heating of the linings above the air, K; over lag, speed scale, gain, fade and their own lag.
     BrakeHeat,
-    /// How far the fan is on, 0 to 1; over start and hysteresis.
+    /// How far the fan is on, 0 to 1; over start, hysteresis and band.
     Fan,
     /// Force of the retarder that follows its stage, N; over what it has more.
     Retarder,

@@ -59,7 +59,7 @@ pub struct HeatSources {
 }
 
 /// Where `x` stands in a band, 0 at its beginning, 1 at its end.
-fn in_band(x: f64, from: f64, to: f64) -> f64 {
+pub(crate) fn in_band(x: f64, from: f64, to: f64) -> f64 {
     ((x - from) / (to - from)).clamp(0.0, 1.0)
 }
 
@@ -82,10 +82,9 @@ impl CoolingParameters {
 
     /// Conductance from coolant to air, W/K.
     #[must_use]
-    pub fn conductance_w_k(&self, coolant_k: f64, fan_runs: bool) -> f64 {
+    pub fn conductance_w_k(&self, coolant_k: f64, fan_on_frac: f64) -> f64 {
         let open = in_band(coolant_k, self.thermostat_from_k, self.thermostat_to_k);
-        let fan = if fan_runs { self.fan_w_k } else { 0.0 };
-        self.body_w_k + open * (self.radiator_w_k + fan)
+        self.body_w_k + open * (self.radiator_w_k + fan_on_frac * self.fan_w_k)
     }
 
     /// Heat into the coolant, W.
@@ -101,12 +100,12 @@ impl CoolingParameters {
     pub fn step_k(
         &self,
         coolant_k: f64,
-        fan_runs: bool,
+        fan_on_frac: f64,
         from: &HeatSources,
         air_k: f64,
         dt_s: f64,
     ) -> f64 {
-        let out_w = self.conductance_w_k(coolant_k, fan_runs) * (coolant_k - air_k);
+        let out_w = self.conductance_w_k(coolant_k, fan_on_frac) * (coolant_k - air_k);
         coolant_k + dt_s * (self.heat_w(from) - out_w) / self.heat_capacity_j_k
     }
 

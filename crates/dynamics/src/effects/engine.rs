@@ -20,6 +20,7 @@ use serde::{Deserialize, Serialize};
 use tractrix_core::{Curve, FuelModel, Grid, RPM_PER_RAD_S};
 
 use crate::bounds::Bounds;
+use crate::effects::cooling::in_band;
 use crate::effects::fuel::{FuelMap, FuelParameters, Range};
 
 /// The engine block of a truck file.
@@ -78,6 +79,10 @@ pub struct EngineParameters {
     /// How far the coolant must fall below that for the fan to stop, K.
     #[serde(default)]
     pub fan_hysteresis_k: f64,
+    /// Span of coolant temperature over which the fan comes and goes, as a viscous clutch lets it, K;
+    /// 0: at once.
+    #[serde(default)]
+    pub fan_band_k: f64,
     /// Altitude above which full load falls, m.
     #[serde(default = "derate_altitude_m")]
     pub derate_altitude_m: f64,
@@ -174,6 +179,7 @@ impl EngineParameters {
         b.within("fan_power_w", self.fan_power_w, 0.0, 80_000.0);
         b.within("fan_on_k", self.fan_on_k, 280.0, 450.0);
         b.within("fan_hysteresis_k", self.fan_hysteresis_k, 0.0, 30.0);
+        b.within("fan_band_k", self.fan_band_k, 0.0, 30.0);
         b.within("derate_altitude_m", self.derate_altitude_m, -500.0, 6_000.0);
         b.within("derate_altitude_1_m", self.derate_altitude_1_m, 0.0, 1e-3);
         b.within("derate_air_k", self.derate_air_k, 250.0, 350.0);
@@ -335,19 +341,28 @@ impl Engine {
         }
     }
 
-    /// Whether the fan runs at a coolant temperature, given whether it ran before.
+    /// How far the fan is on at a coolant temperature, 0 to 1, given how far it was before: play between
+    /// the ramp on which it comes and the one, a hysteresis below, on which it goes.
     #[must_use]
-    pub fn fan_runs(&self, ran: bool, coolant_k: f64) -> bool {
+    pub fn fan_on_frac(&self, before: f64, coolant_k: f64) -> f64 {
         let p = &self.parameters;
-        coolant_k > if ran { p.fan_on_k - p.fan_hysteresis_k } else { p.fan_on_k }
+        let over = |from_k: f64| {
+            if p.fan_band_k > 0.0 {
+                in_band(coolant_k, from_k, from_k + p.fan_band_k)
+            } else if coolant_k > from_k {
+                1.0
+            } else {
+                0.0
+            }
+        };
+        before.clamp(over(p.fan_on_k), over(p.fan_on_k - p.fan_hysteresis_k))
     }
 
     /// Torque that the auxiliaries take from the crank, Nm.
     #[must_use]
-    pub fn auxiliary_nm(&self, speed_rad_s: f64, fan_runs: bool) -> f64 {
+    pub fn auxiliary_nm(&self, speed_rad_s: f64, fan_on_frac: f64) -> f64 {
         let p = &self.parameters;
-        let fan_w = if fan_runs { p.fan_power_w } else { 0.0 };
-        self.crank_nm(p.auxiliary_power_w + fan_w, speed_rad_s)
+        self.crank_nm(p.auxiliary_power_w + fan_on_frac * p.fan_power_w, speed_rad_s)
     }
 
     /// Torque that takes a power from the crank, Nm.

@@ -136,7 +136,7 @@ impl TruckModel {
             distance_m: 0.0,
             substeps: 0,
             engine_speed_rad_s: geared.max(idle),
-            engine_torque_nm: self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, false),
+            engine_torque_nm: self.engine.friction_nm(idle) + self.engine.auxiliary_nm(idle, 0.0),
             engine_brake_nm: 0.0,
             retarder_nm: 0.0,
             clutch_locked: locked,
@@ -157,7 +157,7 @@ impl TruckModel {
             tyre_warmth: 0.0,
             coolant_k: 355.0,
             overheat_k: 0.0,
-            fan_runs: false,
+            fan_on_frac: 0.0,
             fuel_g: 0.0,
             fuel_rate_g_s: 0.0,
             forces: Forces::default(),
@@ -249,8 +249,8 @@ impl TruckModel {
             retarder_w: s.forces.retarder_heat_n * s.speed_m_s.abs(),
         };
         let air_k = patch.air_temperature_k;
-        s.fan_runs = self.engine.fan_runs(s.fan_runs, s.coolant_k);
-        s.coolant_k = self.coolant_step_k(s.coolant_k, s.fan_runs, &from, air_k, SUBSTEP_S);
+        s.fan_on_frac = self.engine.fan_on_frac(s.fan_on_frac, s.coolant_k);
+        s.coolant_k = self.coolant_step_k(s.coolant_k, s.fan_on_frac, &from, air_k, SUBSTEP_S);
         s.overheat_k = self.engine.overheat_step_k(s.overheat_k, s.coolant_k, SUBSTEP_S);
     }
 
@@ -258,16 +258,16 @@ impl TruckModel {
     fn coolant_step_k(
         &self,
         coolant_k: f64,
-        fan_runs: bool,
+        fan_on_frac: f64,
         from: &HeatSources,
         air_k: f64,
         dt_s: f64,
     ) -> f64 {
         if let Some(cooling) = &self.parameters.cooling {
-            return cooling.step_k(coolant_k, fan_runs, from, air_k, dt_s);
+            return cooling.step_k(coolant_k, fan_on_frac, from, air_k, dt_s);
         }
-        let fan = if fan_runs { 12.0 } else { 0.0 };
-        let level = air_k + COOLANT.2 + COOLANT.1 * from.indicated_w - fan;
+        let fan_k = 12.0 * fan_on_frac;
+        let level = air_k + COOLANT.2 + COOLANT.1 * from.indicated_w - fan_k;
         coolant_k + (level.max(350.0) - coolant_k) * dt_s / COOLANT.0
     }
 
@@ -278,16 +278,18 @@ impl TruckModel {
         if fan_w == 0.0 {
             return 0.0;
         }
-        let (mut coolant_k, mut runs, mut count) = (air_k + COOLANT.2, false, 0_u32);
+        let (mut coolant_k, mut on, mut sum) = (air_k + COOLANT.2, 0.0, 0.0);
         const HOUR_S: u32 = 3_600;
         for second in 0..2 * HOUR_S {
-            runs = self.engine.fan_runs(runs, coolant_k);
-            let indicated_w = indicated_w + if runs { fan_w } else { 0.0 };
+            on = self.engine.fan_on_frac(on, coolant_k);
+            let indicated_w = indicated_w + on * fan_w;
             let from = HeatSources { indicated_w, ..HeatSources::default() };
-            coolant_k = self.coolant_step_k(coolant_k, runs, &from, air_k, 1.0);
-            count += u32::from(second >= HOUR_S && runs);
+            coolant_k = self.coolant_step_k(coolant_k, on, &from, air_k, 1.0);
+            if second >= HOUR_S {
+                sum += on;
+            }
         }
-        fan_w * f64::from(count) / f64::from(HOUR_S)
+        fan_w * sum / f64::from(HOUR_S)
     }
 
     /// The road under the truck where the map says `patch`.

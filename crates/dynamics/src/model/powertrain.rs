@@ -120,7 +120,7 @@ impl TruckModel {
     /// Torque with which the idle governor holds the engine, Nm.
     fn holding_nm(&self, s: &TruckState) -> f64 {
         let n = s.engine_speed_rad_s;
-        self.engine.friction_nm(n) + self.engine.auxiliary_nm(n, s.fan_runs)
+        self.engine.friction_nm(n) + self.engine.auxiliary_nm(n, s.fan_on_frac)
     }
 
     /// What request and schedule want, within the engine's range and the hold time.
@@ -219,7 +219,7 @@ impl TruckModel {
         let n = s.engine_speed_rad_s;
         let crank_nm = s.engine_torque_nm
             - self.engine.friction_nm(n)
-            - self.engine.auxiliary_nm(n, s.fan_runs)
+            - self.engine.auxiliary_nm(n, s.fan_on_frac)
             - s.engine_brake_nm;
         let geared = d.engine_speed_rad_s(s.speed_m_s, gear);
         let open = s.shift.phase == ShiftPhase::Open || gear == 0;

@@ -1,9 +1,10 @@
-//! Heat of retarder and engine brake, and the grip of the drive axles.
+//! Heat of retarder and engine brake, the fan, and the grip of the drive axles.
 //!
 //! The story: the retarder gave 400 kW for as long as anybody asked, because its heat went nowhere,
 //! and on a wet road retarder, engine brake and service brakes each got the drive axles' whole grip.
 
 use dynamics::effects::cooling::{CoolingParameters, HeatSources};
+use dynamics::effects::engine::Engine;
 use dynamics::{RoadPatch, TruckModel, TruckParameters, TruckState};
 use tractrix_core::{BrakeMode, Command, GRAVITY_M_S2};
 
@@ -43,7 +44,7 @@ fn with_the_thermostat_open_the_coolant_warms_as_one_heat_capacity() {
     let level_k = air_k + 250e3 / g;
     let (mut t, start) = (c.thermostat_to_k, c.thermostat_to_k);
     for _ in 0..20_000 {
-        t = c.step_k(t, true, &from, air_k, 0.005);
+        t = c.step_k(t, 1.0, &from, air_k, 0.005);
     }
     let want = level_k + (start - level_k) * (-100.0 * g / c.heat_capacity_j_k).exp();
     assert!((t - want).abs() < 1e-3, "{t} for {want}");
@@ -60,10 +61,41 @@ fn heat_that_goes_in_and_does_not_come_out_warms_the_coolant() {
     let from = HeatSources { indicated_w: 100e3, engine_brake_w: 50e3, retarder_w: 200e3 };
     let mut t = 350.0;
     for _ in 0..1000 {
-        t = c.step_k(t, false, &from, 288.15, 0.005);
+        t = c.step_k(t, 0.0, &from, 288.15, 0.005);
     }
     let joules = 5.0 * (0.45 * 100e3 + 0.3 * 50e3 + 200e3);
     assert!((t - 350.0 - joules / c.heat_capacity_j_k).abs() < 1e-9);
+}
+
+/// A clutch of plates switches; a viscous one comes over a span of the coolant's temperature and goes,
+/// by the hysteresis later, over the same.
+#[test]
+fn a_viscous_fan_comes_and_goes_over_its_band() {
+    let engine = |band_k: f64| {
+        let truck = TruckParameters::load("longhaul").unwrap();
+        let truck = truck.with_parameter("engine.fan_band_k", band_k).unwrap();
+        Engine::new(truck.engine).unwrap()
+    };
+    let (from_k, hysteresis_k) = {
+        let e = engine(0.0);
+        (e.parameters.fan_on_k, e.parameters.fan_hysteresis_k)
+    };
+    let course = |band_k: f64, coolant_k: &[f64]| -> Vec<f64> {
+        let (e, mut on) = (engine(band_k), 0.0);
+        let step = |t: &f64| {
+            on = e.fan_on_frac(on, *t);
+            on
+        };
+        coolant_k.iter().map(step).collect()
+    };
+    let away_k = from_k - hysteresis_k;
+    let turns = [from_k, from_k + 0.1, away_k + 0.1, away_k - 0.1, away_k + 0.1];
+    assert_eq!(course(0.0, &turns), [0.0, 1.0, 1.0, 0.0, 0.0]);
+    let turns = [from_k, from_k + 1.0, from_k + 3.0, from_k - 0.5, away_k + 1.0, from_k + 1.0];
+    let on = course(4.0, &turns);
+    for (is, want) in on.iter().zip([0.0, 0.25, 0.75, 0.75, 0.25, 0.25]) {
+        assert!((is - want).abs() < 1e-9, "{on:?}");
+    }
 }
 
 /// Held at 80 km/h with full demand the retarder ends where what is left of it is what the radiator
@@ -83,7 +115,11 @@ fn a_long_descent_ends_at_the_temperature_that_balances() {
     // full_w (to - T)/(to - from) + engine_w = g (T - air)
     let per_k = full_w / (c.derate_to_k - c.derate_from_k);
     let want_k = (per_k * c.derate_to_k + engine_w + g * air_k) / (per_k + g);
-    assert!(s.fan_runs && (s.coolant_k - want_k).abs() < 0.02, "{} for {want_k}", s.coolant_k);
+    assert!(
+        s.fan_on_frac == 1.0 && (s.coolant_k - want_k).abs() < 0.02,
+        "{} for {want_k}",
+        s.coolant_k
+    );
     let held_w = s.forces.retarder_n * v;
     assert!((held_w / (g * (want_k - air_k) - engine_w) - 1.0).abs() < 0.005);
     assert!((200e3..320e3).contains(&held_w), "a water retarder's lasting power: {held_w} W");

@@ -102,7 +102,7 @@ fn planner_and_plant_read_the_same_map() {
         assert_eq!(limits.fuel.rate_g_s(rad_s, nm), e.fuel_rate_g_s(rad_s, nm));
     }
     let idle = 600.0 / RPM_PER_RAD_S;
-    let holding = e.friction_nm(idle) + e.auxiliary_nm(idle, false);
+    let holding = e.friction_nm(idle) + e.auxiliary_nm(idle, 0.0);
     assert_eq!(limits.idle_fuel_g_s, e.fuel_rate_g_s(idle, holding));
     assert!((2.0..3.0).contains(&(limits.idle_fuel_g_s * 3.6 / 0.835)), "l/h at idle");
 }

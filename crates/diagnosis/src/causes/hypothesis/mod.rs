@@ -10,7 +10,7 @@ use crate::causes::param::{P, Theta};
 use crate::replay::{Group, affects};
 
 /// Where the fit of the shape parameters begins, in their order.
-pub(crate) type Start = [f64; 2];
+pub(crate) type Start = [f64; 3];
 
 /// Part of the width between its bounds within which a figure counts as at one.
 const BOUND: f64 = 1e-3;

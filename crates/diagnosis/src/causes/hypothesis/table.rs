@@ -20,16 +20,16 @@ const STEERING: &[C] = &[C::SteeringWheelRad, C::YawRateRadS];
 const METERS: &[C] = &[C::FuelRateGS, C::Co2RateGS];
 
 /// No shape to begin with.
-const ONE: &[Start] = &[[0.0; 2]];
+const ONE: &[Start] = &[[0.0; 3]];
 /// A side force turns the truck one way or the other by where it acts: between the two lies a share
 /// that turns it not at all, which no fit passes.
-const EITHER_SIDE: &[Start] = &[[0.0, 0.0], [0.2, 0.0]];
+const EITHER_SIDE: &[Start] = &[[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]];
 /// A delay is a dead time, a lag or both.
-const LATE_OR_SLOW: &[Start] = &[[0.0, 0.0], [0.7, 0.0]];
+const LATE_OR_SLOW: &[Start] = &[[0.0, 0.0, 0.0], [0.7, 0.0, 0.0]];
 /// Boost is there from one load on, or comes over a quarter of it.
-const SUDDEN_OR_SOFT: &[Start] = &[[0.0, 0.0], [0.0, 0.25]];
+const SUDDEN_OR_SOFT: &[Start] = &[[0.0, 0.0, 0.0], [0.0, 0.25, 0.0]];
 /// A meter of a rate may be off by a factor, or more the higher the rate.
-const RATES: &[Start] = &[[0.0, 0.0], [1.0, 0.0]];
+const RATES: &[Start] = &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]];
 
 /// Mass of a laden train over that of its payload, 1: 40 t of which 25 t are payload.
 const TRAIN_OVER_PAYLOAD: f64 = 1.6;
@@ -84,12 +84,20 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         0.0,
     )
     .along(&[Weather("time_s")]),
-    h("mass", &[P::Mass], &[P::StiffnessFollowsMass], &[[0.0, 0.0], [1.0, 0.0]], LONG, 0.02, 0.0)
-        .along(&[Open("grade_frac"), Open("accel_y_m_s2")])
-        .bringing(&[
-            (P::PayloadX, TRAIN_OVER_PAYLOAD * LIES_ELSEWHERE_M),
-            (P::PayloadSpread, TRAIN_OVER_PAYLOAD * LIES_APART_FRAC),
-        ]),
+    h(
+        "mass",
+        &[P::Mass],
+        &[P::StiffnessFollowsMass],
+        &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
+        LONG,
+        0.02,
+        0.0,
+    )
+    .along(&[Open("grade_frac"), Open("accel_y_m_s2")])
+    .bringing(&[
+        (P::PayloadX, TRAIN_OVER_PAYLOAD * LIES_ELSEWHERE_M),
+        (P::PayloadSpread, TRAIN_OVER_PAYLOAD * LIES_APART_FRAC),
+    ]),
     h("grade_bias", &[P::GradeBias], &[], ONE, &[C::GradeFrac, C::GpsAltitudeM], 0.0005, 0.0)
         .along(&[Open("grade_frac")]),
     h("map_shift", &[P::MapShift], &[], ONE, &[C::GradeFrac, C::SMapM], 10.0, 0.0)
@@ -98,7 +106,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "tyre_warmup",
         &[P::WarmupAmp],
         &[P::WarmupTau],
-        &[[-0.7, 0.0], [0.0, 0.0], [0.7, 0.0]],
+        &[[-0.7, 0.0, 0.0], [0.0, 0.0, 0.0], [0.7, 0.0, 0.0]],
         LONG,
         0.1,
         1.0,
@@ -109,16 +117,16 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
     h(
         "fan_load",
         &[P::FanPower],
-        &[P::FanStart, P::FanWidth],
+        &[P::FanStart, P::FanWidth, P::FanBand],
         &[
-            [-10.0, 0.0],
-            [-5.0, 0.0],
-            [-2.0, 0.0],
-            [1.0, 0.0],
-            [4.0, 0.0],
-            [-5.0, 4.0],
-            [-2.0, 4.0],
-            [1.0, 4.0],
+            [-10.0, 0.0, 0.0],
+            [-5.0, 0.0, 0.0],
+            [-2.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+            [4.0, 0.0, 0.0],
+            [-5.0, 4.0, 3.0],
+            [-2.0, 4.0, 3.0],
+            [1.0, 4.0, 3.0],
         ],
         WITH_COOLANT,
         6.0,
@@ -133,7 +141,13 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "altitude_derate",
         &[P::Altitude],
         &[P::AltitudeStart],
-        &[[-1200.0, 0.0], [-700.0, 0.0], [-200.0, 0.0], [300.0, 0.0], [700.0, 0.0]],
+        &[
+            [-1200.0, 0.0, 0.0],
+            [-700.0, 0.0, 0.0],
+            [-200.0, 0.0, 0.0],
+            [300.0, 0.0, 0.0],
+            [700.0, 0.0, 0.0],
+        ],
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::GpsAltitudeM],
         0.015,
         1.0,
@@ -143,7 +157,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "heat_derate",
         &[P::HeatAir],
         &[P::HeatAirStart],
-        &[[-12.0, 0.0], [-6.0, 0.0], [0.0, 0.0], [4.0, 0.0]],
+        &[[-12.0, 0.0, 0.0], [-6.0, 0.0, 0.0], [0.0, 0.0, 0.0], [4.0, 0.0, 0.0]],
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::AmbientTempDegc],
         0.01,
         1.0,
@@ -153,7 +167,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "heat_derate",
         &[P::HeatCoolant],
         &[P::HeatCoolantStart, P::HeatCoolantLag],
-        &[[-8.0, 0.0], [-4.0, 0.0], [0.0, 0.0], [5.0, 0.0], [9.0, 0.0]],
+        &[[-8.0, 0.0, 0.0], [-4.0, 0.0, 0.0], [0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [9.0, 0.0, 0.0]],
         &[C::AcceleratorPedalFrac, C::EngineTorquePercent, C::EngineSpeedRpm, C::CoolantTempDegc],
         0.01,
         1.0,
@@ -178,15 +192,15 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         &[P::FuelLow],
         &[P::FuelLowLoad, P::FuelLowOver],
         &[
-            [-0.5, 0.0],
-            [0.0, 0.0],
-            [0.6, 0.0],
-            [-0.5, 1.0],
-            [0.0, 1.0],
-            [0.6, 1.0],
-            [-0.5, 2.0],
-            [0.0, 2.0],
-            [0.6, 2.0],
+            [-0.5, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            [0.6, 0.0, 0.0],
+            [-0.5, 1.0, 0.0],
+            [0.0, 1.0, 0.0],
+            [0.6, 1.0, 0.0],
+            [-0.5, 2.0, 0.0],
+            [0.0, 2.0, 0.0],
+            [0.6, 2.0, 0.0],
         ],
         &[C::FuelRateGS, C::EngineTorquePercent, C::EngineSpeedRpm],
         0.04,
@@ -201,7 +215,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "brake_fade",
         &[P::Fade],
         &[P::FadeStart, P::LiningLag],
-        &[[-80.0, 0.0], [-40.0, 0.0], [0.0, 0.0], [60.0, 0.0]],
+        &[[-80.0, 0.0, 0.0], [-40.0, 0.0, 0.0], [0.0, 0.0, 0.0], [60.0, 0.0, 0.0]],
         WITH_PRESSURE,
         0.05,
         1.0,
@@ -215,7 +229,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "hidden_retarder",
         &[P::RetarderBrake],
         &[P::RetarderSaturation],
-        &[[0.0, 0.0], [2.0, 0.0]],
+        &[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
         WITH_DEMAND,
         600.0,
         1.0,
@@ -226,7 +240,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "hidden_retarder",
         &[P::RetarderCoast],
         &[P::RetarderFrom],
-        &[[-4.0, 0.0], [-2.0, 0.0], [0.0, 0.0], [2.0, 0.0]],
+        &[[-4.0, 0.0, 0.0], [-2.0, 0.0, 0.0], [0.0, 0.0, 0.0], [2.0, 0.0, 0.0]],
         WITH_PEDAL,
         100.0,
         1.0,
@@ -236,7 +250,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "hidden_retarder",
         &[P::RetarderSlope],
         &[P::RetarderSteep],
-        &[[0.004, 0.0], [0.01, 0.0], [0.018, 0.0]],
+        &[[0.004, 0.0, 0.0], [0.01, 0.0, 0.0], [0.018, 0.0, 0.0]],
         WITH_PEDAL,
         100.0,
         1.0,
@@ -263,7 +277,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "steering_free_play",
         &[P::FreePlay],
         &[P::PlayCentring],
-        &[[0.0, 0.0], [0.2, 0.0]],
+        &[[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]],
         STEERING,
         0.015,
         1.0,
@@ -289,7 +303,7 @@ pub(crate) const CATALOGUE: &[Hypothesis] = &[
         "payload_position",
         &[P::PayloadX],
         &[P::StiffnessFollows, P::PayloadSpread],
-        &[[0.0, 0.0], [1.0, 0.0]],
+        &[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]],
         STEERING,
         0.15,
         0.0,
