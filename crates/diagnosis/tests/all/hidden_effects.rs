@@ -29,12 +29,25 @@ fn plant() -> Plant {
 static IN_ORDER: LazyLock<Baseline> =
     LazyLock::new(|| Baseline::learn(&plant(), &drives(&[], 900), &Serial).unwrap());
 
+/// The same of the second family.
+static SECOND_IN_ORDER: LazyLock<Baseline> = LazyLock::new(|| {
+    Baseline::learn(&plant(), &second::generate(&[], &SHORT, 901), &Serial).unwrap()
+});
+
 fn judge(set: &DriveSet) -> Result<Diagnosis, DiagnosisError> {
     judge_with(set, &Options::default())
 }
 
 fn judge_with(set: &DriveSet, options: &Options) -> Result<Diagnosis, DiagnosisError> {
-    diagnose_with(&plant(), set, Some(&IN_ORDER), options, &Serial, &mut |_| {})
+    judge_by(set, &IN_ORDER, options)
+}
+
+fn judge_by(
+    set: &DriveSet,
+    clean: &Baseline,
+    options: &Options,
+) -> Result<Diagnosis, DiagnosisError> {
+    diagnose_with(&plant(), set, Some(clean), options, &Serial, &mut |_| {})
 }
 
 fn cause(id: &'static str, size: f64) -> Effect {
@@ -186,14 +199,10 @@ fn a_light_wind_is_fitted_whatever_its_signs() {
 /// short, and what was left made the verdict `ambiguous` with a function of the pedal.
 #[test]
 fn boost_that_comes_softly_is_explained_with_its_lag() {
-    let order = second::generate(&[], &SHORT, 901);
-    let baseline = Baseline::learn(&plant(), &order, &Serial).unwrap();
     for (size, shape, seed) in [(0.5, [0.6, 0.9, 0.7, 0.5], 31), (0.8, [0.4, 0.5, 0.3, 0.5], 32)] {
         let hidden = [Effect::Cause { id: "turbo_lag", size, shape: Shape(shape) }];
         let set = second::generate(&hidden, &SHORT, seed);
-        let options = Options::default();
-        let d = diagnose_with(&plant(), &set, Some(&baseline), &options, &Serial, &mut |_| {});
-        let d = d.unwrap();
+        let d = judge_by(&set, &SECOND_IN_ORDER, &Options::default()).unwrap();
         assert_eq!(named(&d), ["turbo_lag"], "{:?}", d.verdict);
         assert_eq!(d.verdict, Verdict::Explained, "{:?}", d.unknown);
         let p = &d.causes[0].parameters;
@@ -210,11 +219,7 @@ fn the_gain_is_that_of_the_truck_that_is_written() {
     let four = Campaign { drives: 4, ..SHORT };
     let hidden = [Effect::Cause { id: "engine_friction", size: 0.6, shape: Shape([0.9; 4]) }];
     let set = second::generate(&hidden, &four, 33);
-    let order = second::generate(&[], &SHORT, 901);
-    let baseline = Baseline::learn(&plant(), &order, &Serial).unwrap();
-    let options = Options::default();
-    let d = diagnose_with(&plant(), &set, Some(&baseline), &options, &Serial, &mut |_| {});
-    let d = d.unwrap();
+    let d = judge_by(&set, &SECOND_IN_ORDER, &Options::default()).unwrap();
     assert_eq!(named(&d), ["engine_friction"]);
     let truck = TruckParameters::load("reference").unwrap();
     let overlay = extend(&truck, "reference", "x", &d.causes, "test").overlay.unwrap();
@@ -222,7 +227,7 @@ fn the_gain_is_that_of_the_truck_that_is_written() {
     let gain = d.gain.unwrap();
     let error_m_s = |of: &Plant| {
         let held = set.drives.iter().filter(|x| gain.held_out.contains(&x.name));
-        baseline.speed_rmse_m_s(of, held)
+        SECOND_IN_ORDER.speed_rmse_m_s(of, held)
     };
     let (before, after) = (gain.speed_rmse_m_s.before, gain.speed_rmse_m_s.after);
     let (plain_m_s, written_m_s) = (error_m_s(&plant()), error_m_s(&written));

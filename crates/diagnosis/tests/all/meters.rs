@@ -1,6 +1,8 @@
 //! Two meters of the same fuel, the control unit's rate and the carbon in the exhaust: which of them
 //! is wrong, as far as anything says so.
 
+use std::sync::LazyLock;
+
 use crate::support::effects::{Effect, Shape};
 use crate::support::{Campaign, generate_apart, second};
 use diagnosis::{
@@ -11,6 +13,13 @@ use dynamics::TruckParameters;
 const SHORT: Campaign = Campaign { drives: 3, duration_s: 600.0, tolerance: 1.0 };
 
 type Generate = fn(&[Effect], &Campaign, u64) -> DriveSet;
+
+/// The first family in order, learned once for all tests here.
+static IN_ORDER: LazyLock<Baseline> = LazyLock::new(|| learned(generate_apart));
+
+fn learned(generate: Generate) -> Baseline {
+    Baseline::learn(&plant(), &generate(&[], &SHORT, 900), &Serial).unwrap()
+}
 
 fn plant() -> Plant {
     Plant::of_truck(&TruckParameters::load("reference").unwrap()).unwrap()
@@ -30,15 +39,17 @@ fn hidden(id: &'static str, size: f64) -> [Effect; 1] {
 
 #[test]
 fn either_meter_is_named_with_either_sign_on_drives_of_both_families() {
-    for generate in [generate_apart as Generate, second::generate] {
-        let clean = Baseline::learn(&plant(), &generate(&[], &SHORT, 900), &Serial).unwrap();
+    let second_in_order = learned(second::generate);
+    for (generate, clean) in
+        [(generate_apart as Generate, &*IN_ORDER), (second::generate, &second_in_order)]
+    {
         for (id, size) in [
             ("fuel_flow_scale", 0.1),
             ("fuel_flow_scale", -0.1),
             ("co2_scale", 0.12),
             ("co2_scale", -0.12),
         ] {
-            let d = judge(&generate(&hidden(id, size), &SHORT, 71), Some(&clean));
+            let d = judge(&generate(&hidden(id, size), &SHORT, 71), Some(clean));
             assert_eq!(named(&d), [id], "{size}: {:?} {:?}", d.verdict, d.unknown);
             let found = d.causes[0].parameters["scale"].value - 1.0;
             assert!((found - size).abs() < 0.4 * size.abs(), "{id} {size}: {found}");
@@ -48,8 +59,7 @@ fn either_meter_is_named_with_either_sign_on_drives_of_both_families() {
 
 #[test]
 fn drives_in_order_say_what_error_of_a_meter_they_would_have_shown() {
-    let clean = Baseline::learn(&plant(), &generate_apart(&[], &SHORT, 900), &Serial).unwrap();
-    let d = judge(&generate_apart(&[], &SHORT, 72), Some(&clean));
+    let d = judge(&generate_apart(&[], &SHORT, 72), Some(&IN_ORDER));
     assert_eq!(d.verdict, Verdict::NothingToExplain, "{:?} {:?}", d.causes, d.unknown);
     for (id, most) in [("fuel_flow_scale", 0.06), ("co2_scale", 0.08)] {
         let smallest = d.detectable.iter().find(|x| x.id == id).unwrap().smallest;
@@ -85,7 +95,6 @@ fn without_the_engines_torque_the_two_meters_are_rivals() {
     ids.extend(d.causes[0].confused_with.iter().map(|c| c.id));
     ids.sort_unstable();
     assert_eq!(ids, ["co2_scale", "fuel_flow_scale"]);
-    let clean = Baseline::learn(&plant(), &generate_apart(&[], &SHORT, 900), &Serial).unwrap();
-    let whole = judge(&set, Some(&clean));
+    let whole = judge(&set, Some(&IN_ORDER));
     assert_eq!(named(&whole), ["fuel_flow_scale"], "{:?}", whole.verdict);
 }
