@@ -28,7 +28,7 @@ export class BirdView {
     canvas.addEventListener("wheel", (e) => { e.preventDefault(); this.zoomBy(Math.exp(-e.deltaY * 0.0015)); }, { passive: false });
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
-    const loop = () => { this.draw(); requestAnimationFrame(loop); };
+    const loop = () => { if (this.changed()) this.draw(); requestAnimationFrame(loop); };
     requestAnimationFrame(loop);
   }
 
@@ -63,6 +63,7 @@ export class BirdView {
     this.canvas.width = Math.round(this.width * ratio);
     this.canvas.height = Math.round(this.height * ratio);
     this.ratio = ratio;
+    this.seen = null; // a canvas of another size is empty
   }
 
   push(frame) {
@@ -73,11 +74,17 @@ export class BirdView {
     this.frames = joins ? [last, frame] : [frame];
   }
 
+  // How far the picture has come from the last frame but one to the last, 0 to 1.
+  progress() {
+    const [a, b] = this.frames;
+    if (!b || a.time_s === b.time_s) return 1;
+    return Math.min(1, (performance.now() - b.at) / Math.max(1, b.at - a.at));
+  }
+
   // The state one frame period ago, between the last two frames: smooth at the screen's rate.
   state() {
     const [a, b] = this.frames.length > 1 ? this.frames : [this.frames[0], this.frames[0]];
-    const span = Math.max(1, b.at - a.at);
-    const t = a === b ? 1 : Math.min(1, (performance.now() - b.at) / span);
+    const t = this.progress();
     const mix = (p, q) => p + (q - p) * t;
     const before = new Map(a.neighbours.map((n) => [n.id, n]));
     const pose = (p, q) => ({ ...q, x_m: mix(p.x_m, q.x_m), y_m: mix(p.y_m, q.y_m), yaw_rad: mix(p.yaw_rad, q.yaw_rad) });
@@ -85,6 +92,15 @@ export class BirdView {
     for (const key of ["s_m", "articulation_rad", "road_wheel_rad"]) ego[key] = mix(a.ego[key], b.ego[key]);
     const ghost = b.ghost && pose(a.ghost ?? b.ghost, b.ghost);
     return { ego, plan: b.plan, ghost, lead: b.lead?.id, others: b.neighbours.map((n) => pose(before.get(n.id) ?? n, n)) };
+  }
+
+  // Whether the picture is another than it was: one that stands still is not drawn again at the
+  // screen's rate.
+  changed() {
+    const seen = [this.frames.at(-1), this.progress(), this.zoom, this.coloursBy, this.chosen, this.followed, this.colors];
+    const same = this.seen?.every((was, i) => was === seen[i]);
+    this.seen = seen;
+    return !same;
   }
 
   draw() {
