@@ -212,7 +212,10 @@ impl TruckParameters {
         let unknown = || self.unknown_parameter(&self.name, path);
         let mut root = toml::Value::try_from(self).map_err(|_| unknown())?;
         *number_at(&mut root, path).ok_or_else(unknown)? = toml::Value::Float(value);
-        root.try_into().map_err(|_| unknown())
+        // Through text, which has every bit: to read values too, all parameters would be compiled for
+        // a second deserialiser.
+        let text = toml::to_string(&root).map_err(|_| unknown())?;
+        toml::from_str(&text).map_err(|_| unknown())
     }
 
     /// The error of a path that names no number, with the nearest that do.

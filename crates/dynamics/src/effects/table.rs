@@ -4,6 +4,8 @@
 //! reproduces the drives that it was fitted to and claims no cause. Outside its signal's range the
 //! table keeps its end value; at walking pace it fades out, because the fit does not see it there.
 
+use serde::de::IntoDeserializer;
+use serde::de::value::StrDeserializer;
 use serde::{Deserialize, Serialize};
 use tractrix_core::{CoreError, Curve};
 
@@ -55,7 +57,8 @@ impl TableSignal {
     /// The signal of a column name; `None` where the truck has no such state (time, position).
     #[must_use]
     pub fn of(name: &str) -> Option<Self> {
-        toml::Value::String(name.to_owned()).try_into().ok()
+        let name: StrDeserializer<'_, serde::de::value::Error> = name.into_deserializer();
+        Self::deserialize(name).ok()
     }
 }
 

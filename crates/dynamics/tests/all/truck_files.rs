@@ -67,6 +67,18 @@ fn an_overlay_changes_what_it_names_and_nothing_else() {
 }
 
 #[test]
+fn a_replaced_parameter_leaves_all_others_as_they_are_to_the_last_bit() {
+    for name in TruckParameters::names() {
+        let truck = TruckParameters::load(name).unwrap();
+        let path = "resistance.rolling_coeff";
+        let awkward = truck.with_parameter(path, 0.1 + 0.2).unwrap();
+        assert_eq!(awkward.parameter(path), Some(0.1 + 0.2));
+        let back = awkward.with_parameter(path, truck.resistance.rolling_coeff).unwrap();
+        assert_eq!(back, truck);
+    }
+}
+
+#[test]
 fn an_overlay_that_names_nothing_is_refused() {
     let base = TruckParameters::load("reference").unwrap();
     let e = base.with_parameter("resistance.rolling_coef", 1.0).unwrap_err();
