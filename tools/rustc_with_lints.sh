@@ -13,7 +13,7 @@ compiled=yes linted=apart documented=no
 case $all in
 */benches/*.rs\ *) compiled=no ;;
 # tests that compute themselves, or have a tick of real time to do it in
-*/diagnosis/tests/* | */dynamics/tests/* | */j1939/tests/* | */planner/tests/* | */truck-node/tests/* | \
+*/diagnosis/tests/* | */j1939/tests/* | */planner/tests/* | */truck-node/tests/* | \
   */diagnosis/src/lib.rs*" --test "* | */traffic-client/src/lib.rs*" --test "* | */bus_loop.rs\ * | */can_soak.rs\ *) optimised=1 ;;
 *" --test "* | */examples/*.rs\ *) optimised=0 ;;
 *" --crate-name build_script_"*) ;;

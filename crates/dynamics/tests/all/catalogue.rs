@@ -24,13 +24,12 @@ fn extended(cause: &Cause, sizes: &[f64]) -> TruckParameters {
 
 /// A drive over a road whose map is known: a climb at full load high up in the heat, coasting until
 /// it is slow and down a gentle slope, braking down the other side until the brakes are hot, then slalom; what the
-/// instruments report every 0.5 s, and the CO2 in the exhaust, g/s.
-fn drive(truck: TruckParameters) -> Vec<(EgoState, f64)> {
+/// instruments report every 0.5 s, and the CO2 in the exhaust, g/s. It is driven as far as it is asked.
+fn drive(truck: TruckParameters) -> impl Iterator<Item = (EgoState, f64)> {
     let model = TruckModel::new(truck, PAYLOAD_KG).unwrap();
     let instruments = model.parameters().instruments;
     let mut s = model.initial_state(0.0, 0.0, 0.0, 18.0);
-    let mut out = Vec::new();
-    for k in 0..2_000 {
+    (0..2_000).map(move |k| {
         let t = 0.5 * f64::from(k);
         let at_m = instruments.map_position_m(s.distance_m);
         let grade_frac = match t {
@@ -55,14 +54,14 @@ fn drive(truck: TruckParameters) -> Vec<(EgoState, f64)> {
         let steering_wheel_rad = 0.3 * (0.4 * t).sin();
         s = model.step(&s, &Command { steering_wheel_rad, ..command }, &patch, 0.5).unwrap();
         let truth = model.ego_state(&s, &patch);
-        out.push((model.measured(&truth), model.measured_co2_g_s(&truth)));
-    }
-    out
+        (model.measured(&truth), model.measured_co2_g_s(&truth))
+    })
 }
 
-/// Largest difference of two drives, each signal in units of what an instrument can tell.
-fn difference(a: &[(EgoState, f64)], b: &[(EgoState, f64)]) -> f64 {
-    let one = |(a, a_co2_g_s): &(EgoState, f64), (b, b_co2_g_s): &(EgoState, f64)| {
+/// Largest difference of two drives until an instrument tells them apart, each signal in units of
+/// what it can tell.
+fn difference(a: &[(EgoState, f64)], b: impl Iterator<Item = (EgoState, f64)>) -> f64 {
+    let one = |(a, a_co2_g_s): &(EgoState, f64), (b, b_co2_g_s): (EgoState, f64)| {
         [
             (a.speed_m_s - b.speed_m_s) / 0.01,
             (a.yaw_rate_rad_s - b.yaw_rate_rad_s) / 1e-4,
@@ -74,7 +73,14 @@ fn difference(a: &[(EgoState, f64)], b: &[(EgoState, f64)]) -> f64 {
         .map(f64::abs)
         .fold(0.0, f64::max)
     };
-    a.iter().zip(b).map(|(a, b)| one(a, b)).fold(0.0, f64::max)
+    let mut largest: f64 = 0.0;
+    for (a, b) in a.iter().zip(b) {
+        largest = largest.max(one(a, b));
+        if largest > 1.0 {
+            break;
+        }
+    }
+    largest
 }
 
 #[test]
@@ -145,22 +151,25 @@ fn both_ends_of_every_parameter_make_a_truck_that_is_accepted() {
 /// nothing: an overlay that named one made the same truck.
 #[test]
 fn no_parameter_is_dead() {
-    let base = drive(TruckParameters::load("reference").unwrap());
+    let base: Vec<_> = drive(TruckParameters::load("reference").unwrap()).collect();
     for c in &CATALOGUE {
         let sizes: Vec<f64> = c.sizes.iter().map(|p| p.prior_sigma).collect();
         for i in 0..sizes.len() {
             let mut alone = vec![0.0; sizes.len()];
             alone[i] = sizes[i];
-            let d = difference(&base, &drive(extended(c, &alone)));
+            let d = difference(&base, drive(extended(c, &alone)));
             assert!(d > 1.0, "{} {}: {d}", c.id, c.sizes[i].path);
         }
-        let with = drive(extended(c, &sizes));
+        if c.shapes.is_empty() {
+            continue;
+        }
+        let with: Vec<_> = drive(extended(c, &sizes)).collect();
         for (i, p) in c.shapes.iter().enumerate() {
             let mut shaped = sizes.clone();
             shaped.resize(sizes.len() + i, 0.0);
             let down = -p.prior_sigma;
             shaped.push(if down >= p.bounds[0] { down } else { p.prior_sigma });
-            let d = difference(&with, &drive(extended(c, &shaped)));
+            let d = difference(&with, drive(extended(c, &shaped)));
             assert!(d > 1.0, "{} {}: {d}", c.id, p.path);
         }
     }
