@@ -16,6 +16,8 @@ pub struct Cubics {
     starts_m: Vec<f64>,
     coefficients: Vec<[f64; 4]>,
     end_m: f64,
+    /// The value everywhere, where it is one.
+    constant: Option<f64>,
 }
 
 impl Default for Cubics {
@@ -28,28 +30,37 @@ impl Cubics {
     /// A constant.
     #[must_use]
     pub fn constant(value: f64) -> Self {
-        Self { starts_m: vec![0.0], coefficients: vec![[value, 0.0, 0.0, 0.0]], end_m: f64::MAX }
+        Self::of_pieces(vec![0.0], vec![[value, 0.0, 0.0, 0.0]])
+    }
+
+    fn of_pieces(starts_m: Vec<f64>, coefficients: Vec<[f64; 4]>) -> Self {
+        let constant = match coefficients[..] {
+            // plus zero, as the sum of a piece has it
+            [[a, b, c, d]] if b == 0.0 && c == 0.0 && d == 0.0 => Some(a + 0.0),
+            _ => None,
+        };
+        Self { starts_m, coefficients, end_m: f64::MAX, constant }
     }
 
     /// From pieces (start m, `[a, b, c, d]`) in order of station; pieces out of order are left
     /// out, no piece gives the constant zero.
     #[must_use]
     pub fn from_pieces(pieces: &[(f64, [f64; 4])]) -> Self {
-        let mut out = Self { starts_m: Vec::new(), coefficients: Vec::new(), end_m: f64::MAX };
+        let (mut starts_m, mut coefficients) = (Vec::new(), Vec::new());
         for &(start, c) in pieces {
-            match out.starts_m.last() {
+            match starts_m.last() {
                 Some(&last) if start < last => {}
                 Some(&last) if start == last => {
-                    let i = out.coefficients.len() - 1;
-                    out.coefficients[i] = c;
+                    let i = coefficients.len() - 1;
+                    coefficients[i] = c;
                 }
                 _ => {
-                    out.starts_m.push(start);
-                    out.coefficients.push(c);
+                    starts_m.push(start);
+                    coefficients.push(c);
                 }
             }
         }
-        if out.starts_m.is_empty() { Self::default() } else { out }
+        if starts_m.is_empty() { Self::default() } else { Self::of_pieces(starts_m, coefficients) }
     }
 
     /// Through knots (station m, value, slope) in order of station, cubic between them, constant
@@ -156,18 +167,14 @@ impl Cubics {
     #[inline]
     pub fn at(&self, s_m: f64) -> f64 {
         // Most lanes and grades of a highway are one constant.
-        self.as_constant().unwrap_or_else(|| self.by_piece(s_m))
+        self.constant.unwrap_or_else(|| self.by_piece(s_m))
     }
 
     /// The value everywhere, where it is one.
     #[inline]
     #[must_use]
-    pub fn as_constant(&self) -> Option<f64> {
-        match self.coefficients[..] {
-            // plus zero, as the sum of a piece has it
-            [[a, b, c, d]] if b == 0.0 && c == 0.0 && d == 0.0 => Some(a + 0.0),
-            _ => None,
-        }
+    pub const fn as_constant(&self) -> Option<f64> {
+        self.constant
     }
 
     fn by_piece(&self, s_m: f64) -> f64 {
