@@ -274,6 +274,9 @@ impl Gate {
         if self.occupied(strictness) {
             return Err(LaneChangeRefusal::Occupied);
         }
+        if self.concerns.iter().all(Option::is_none) {
+            return Ok(());
+        }
         let down_to_m_s = course.start_m_s.min(course.end_m_s);
         let (mut entry_s, mut time_s) = (None, 0.0);
         let mut here = path.at(road, s_m + course.at(time_s).1);

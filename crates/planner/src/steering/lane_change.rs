@@ -6,7 +6,8 @@
 //! `RA |v² k - g bank| / a_rollover` below its bound (`RA`: rearward amplification), and the corners
 //! of tractor and trailer inside the two lanes. The trailer follows by the paper's Eq. 1.
 
-use super::path::{Lateral, LateralPath, Quintic, lane_centre, off_centre};
+use super::corners::Posed;
+use super::path::{Lateral, LateralPath, Quintic, bend, lane_centre, off_centre};
 use crate::error::config_in;
 use crate::safety::{Gate, SpeedCourse, Strictness};
 use crate::{LaneChoice, PlannerError};
@@ -349,16 +350,27 @@ fn beginning(start: &Start<'_>, lane: u16) -> Lateral {
 /// The outer edges of two lanes.
 struct Corridor<'a> {
     lanes: [Option<&'a road::LaneTrack>; 2],
+    /// The edges, m, where they are the same all along.
+    throughout_m: Option<(f64, f64)>,
 }
 
 impl<'a> Corridor<'a> {
     fn new(road: &'a Road, a: u16, b: u16) -> Self {
         let lane = |id: u16| road.lanes().get(usize::from(id));
-        Self { lanes: [lane(a), lane(b)] }
+        let mut corridor = Self { lanes: [lane(a), lane(b)], throughout_m: None };
+        let constant =
+            |l: &road::LaneTrack| l.center.as_constant().and(l.width.as_constant()).is_some();
+        if corridor.lanes.iter().flatten().all(|l| constant(l)) {
+            corridor.throughout_m = Some(corridor.edges_m(0.0));
+        }
+        corridor
     }
 
     /// Right and left edge at a station, m.
     fn edges_m(&self, s_m: f64) -> (f64, f64) {
+        if let Some(edges_m) = self.throughout_m {
+            return edges_m;
+        }
         self.lanes.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), l| {
             let (centre, half) = (l.center_d_m(s_m), 0.5 * l.width_m(s_m));
             (low.min(centre - half), high.max(centre + half))
@@ -377,7 +389,7 @@ fn drivable(
 ) -> bool {
     let (g, l) = (&start.limits.geometry, &start.limits.lateral);
     let sharpest = 0.8 * libm::tan(l.max_road_wheel_rad) / g.wheelbase_m;
-    let mut bend = -start.ego.trailer.articulation_rad; // tractor minus trailer heading
+    let mut fold_rad = -start.ego.trailer.articulation_rad; // tractor minus trailer heading
     let mut time_s = 0.0;
     while time_s <= course.duration_s + 1.0 {
         let (v, travelled) = course.at(time_s);
@@ -393,7 +405,7 @@ fn drivable(
             slope: centre.slope + q.slope,
             second_1_m: q.second_1_m,
         };
-        let (angle, curvature) = lateral.direction(road_curvature_1_m);
+        let (tan, curvature) = bend(&lateral, road_curvature_1_m);
         let felt = v * v * curvature - GRAVITY_M_S2 * line.bank().at(here_m);
         let transfer = REARWARD_AMPLIFICATION * felt.abs() / l.rollover_accel_m_s2;
         if (v * v * q.second_1_m).abs() > accel_max
@@ -405,23 +417,15 @@ fn drivable(
         }
         let (low, high) = corridor.edges_m(s_m);
         let (low, high) = (low + config.edge_margin_m, high - config.edge_margin_m);
-        let half = 0.5 * g.width_m;
-        let across = |ahead_m: f64, sin: f64, from_m: f64| {
-            from_m + ahead_m * sin - 0.5 * road_curvature_1_m * ahead_m * ahead_m
-        };
-        let sin = libm::sin(angle);
-        let front = across(g.front_m, sin, lateral.d_m);
-        let hitch = lateral.d_m + g.hitch_ahead_m * sin;
-        let rear = across(-g.trailer_rear_m, libm::sin(angle - bend), hitch);
-        for d_m in [front, rear] {
-            if d_m - half < low || d_m + half > high {
-                return false;
-            }
+        let posed = Posed { d_m: lateral.d_m, tan, fold_rad, road_curvature_1_m };
+        if !posed.is_within(g, (low, high)) {
+            return false;
         }
         // Eq. 1: the trailer's axle group moves along the trailer
         let turn = v * curvature;
-        let pull = v * libm::sin(bend) + g.hitch_ahead_m * turn * libm::cos(bend);
-        bend += (turn - pull / g.hitch_to_trailer_axle_m) * STEP_S;
+        let (sin, cos) = libm::sincos(fold_rad);
+        let pull = v * sin + g.hitch_ahead_m * turn * cos;
+        fold_rad += (turn - pull / g.hitch_to_trailer_axle_m) * STEP_S;
         time_s += STEP_S;
     }
     true

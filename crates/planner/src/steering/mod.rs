@@ -4,11 +4,13 @@
 //! |---|---|
 //! | `path` | lane centres, quintic transitions, what is driven |
 //! | `lane_change` | candidates of a change, the cheapest that the safety gate passes |
+//! | `corners` | whether tractor and trailer stay between the edges of two lanes |
 //! | `maneuver` | the state machine: keep lane, change, abort |
 //! | `model` | the truck's lateral dynamics in discrete time, Riccati equation |
 //! | `controller` | feedforward and feedback along a path |
 
 mod controller;
+mod corners;
 mod lane_change;
 mod maneuver;
 mod model;

@@ -117,6 +117,9 @@ pub(super) fn lane_centre(road: &Road, lane: u16, s_m: f64) -> Lateral {
     let Some(track) = road.lanes().get(usize::from(lane)) else {
         return Lateral::default();
     };
+    if let Some(d_m) = track.center.as_constant() {
+        return Lateral { d_m, ..Lateral::default() };
+    }
     let half = 0.5 * SLOPE_BASE_M;
     Lateral {
         d_m: track.center_d_m(s_m),
@@ -193,7 +196,7 @@ impl LateralPath {
 }
 
 /// Tangent of the heading relative to the road, and map curvature, 1/m.
-fn bend(lateral: &Lateral, road_curvature_1_m: f64) -> (f64, f64) {
+pub(super) fn bend(lateral: &Lateral, road_curvature_1_m: f64) -> (f64, f64) {
     let k_r = road_curvature_1_m;
     let stretch = (1.0 - k_r * lateral.d_m).max(0.05);
     let tan = lateral.slope / stretch;
