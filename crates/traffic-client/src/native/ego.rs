@@ -81,19 +81,21 @@ impl EgoSpans {
     fn add(&mut self, body: &Corners, map: &LaneMap) {
         let (mut rear, mut front) = (f64::INFINITY, f64::NEG_INFINITY);
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        // No number is NaN here, which `min` and `max` would look for.
         for &(s, d) in body {
-            (rear, front) = (rear.min(s), front.max(s));
-            (low, high) = (low.min(d), high.max(d));
+            rear = if s < rear { s } else { rear };
+            front = if s > front { s } else { front };
+            low = if d < low { d } else { low };
+            high = if d > high { d } else { high };
         }
         let middle = 0.5 * (rear + front);
         for (k, lane) in map.lanes.iter().enumerate() {
+            if lane.s_end_m < rear || lane.s_start_m > front {
+                continue;
+            }
             let (center, width) = lane.center_and_width_m(middle);
             let half = 0.5 * width - MARGIN_M;
-            if lane.s_end_m < rear
-                || lane.s_start_m > front
-                || low > center + half
-                || high < center - half
-            {
+            if low > center + half || high < center - half {
                 continue;
             }
             let lane = k as u16;
@@ -118,7 +120,8 @@ struct Turned {
 
 impl Turned {
     fn by(angle: f64) -> Self {
-        Self { angle, sin: libm::sin(angle), cos: libm::cos(angle) }
+        let (sin, cos) = libm::sincos(angle);
+        Self { angle, sin, cos }
     }
 }
 

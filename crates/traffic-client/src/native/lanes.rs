@@ -40,6 +40,8 @@ pub(crate) struct Lane {
     center_d_m: Vec<f64>,
     /// Width at the cell borders, m.
     width_m: Vec<f64>,
+    /// Offset of the centre and width, m, where they are the same all along.
+    throughout_m: Option<(f64, f64)>,
     /// Section of each cell.
     section: Vec<u32>,
     sections: Vec<Section>,
@@ -68,12 +70,20 @@ impl Lane {
 
     /// Offset of the lane's centre from the reference line, m.
     pub(crate) fn center_d_m(&self, s_m: f64) -> f64 {
+        if let Some((center_d_m, _)) = self.throughout_m {
+            return center_d_m;
+        }
         let (k, f) = self.cell(s_m);
         self.center_d_m[k] + f * (self.center_d_m[k + 1] - self.center_d_m[k])
     }
 
     /// [`Self::center_d_m`] and the width, m.
+    #[inline]
     pub(crate) fn center_and_width_m(&self, s_m: f64) -> (f64, f64) {
+        self.throughout_m.unwrap_or_else(|| self.center_and_width_in_cell_m(s_m))
+    }
+
+    fn center_and_width_in_cell_m(&self, s_m: f64) -> (f64, f64) {
         let (k, f) = self.cell(s_m);
         let at = |table: &[f64]| table[k] + f * (table[k + 1] - table[k]);
         (at(&self.center_d_m), at(&self.width_m))
@@ -82,6 +92,9 @@ impl Lane {
     /// [`Self::center_d_m`], and its slope against the reference line, dimensionless, positive to
     /// the left.
     pub(crate) fn center_and_slope(&self, s_m: f64) -> (f64, f64) {
+        if let Some((center_d_m, _)) = self.throughout_m {
+            return (center_d_m, 0.0);
+        }
         let (k, f) = self.cell(s_m);
         let (from_m, to_m) = (self.center_d_m[k], self.center_d_m[k + 1]);
         (from_m + f * (to_m - from_m), (to_m - from_m) * CELLS_PER_M)
@@ -131,14 +144,20 @@ impl LaneSource<'_> {
             }
             section.push((sections.len() - 1) as u32);
         }
+        let center_d_m: Vec<f64> = (0..=cells).map(|k| (self.center_d_m)(border(k))).collect();
+        let width_m: Vec<f64> = (0..=cells).map(|k| (self.width_m)(border(k))).collect();
+        let is_even = |table: &[f64]| table.windows(2).all(|w| w[0].to_bits() == w[1].to_bits());
         Lane {
             usage: self.usage,
             drops: self.drops,
             leaves: self.leaves,
             s_start_m: self.s_start_m,
             s_end_m: self.s_end_m,
-            center_d_m: (0..=cells).map(|k| (self.center_d_m)(border(k))).collect(),
-            width_m: (0..=cells).map(|k| (self.width_m)(border(k))).collect(),
+            // plus zero, as the sum in a cell has it
+            throughout_m: (is_even(&center_d_m) && is_even(&width_m))
+                .then(|| (center_d_m[0] + 0.0, width_m[0] + 0.0)),
+            center_d_m,
+            width_m,
             section,
             sections,
         }
@@ -277,6 +296,9 @@ impl LaneMap {
 
     /// Sine of the grade angle, positive uphill.
     pub(crate) fn sin_grade(&self, s_m: f64) -> f64 {
+        if let [only] = self.sin_grade[..] {
+            return only;
+        }
         let k = ((s_m - self.s_start_m) * CELLS_PER_M).max(0.0) as usize;
         self.sin_grade[k.min(self.sin_grade.len() - 1)]
     }
@@ -336,5 +358,24 @@ impl LaneMap {
             .sample()
         });
         Self::new(lanes.collect(), 0.0, length_m, &|_| 0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lane_that_is_the_same_all_along_is_read_as_its_cells_would_be() {
+        let map = LaneMap::straight(3, 1003.7, 3.6, 30.0);
+        for lane in &map.lanes {
+            assert!(lane.throughout_m.is_some());
+            let by_cell = Lane { throughout_m: None, ..lane.clone() };
+            for s_m in (-20..1100).map(|k| 0.997 * f64::from(k)) {
+                assert_eq!(lane.center_and_width_m(s_m), by_cell.center_and_width_m(s_m));
+                assert_eq!(lane.center_and_slope(s_m), by_cell.center_and_slope(s_m));
+                assert_eq!(lane.center_d_m(s_m), by_cell.center_d_m(s_m));
+            }
+        }
     }
 }
