@@ -81,17 +81,20 @@ impl Engine {
     }
 
     /// The lane that vehicle `i` drives in, or comes into.
+    #[inline]
     fn driven(&self, i: usize) -> u16 {
         let fleet = &self.state.fleet;
         if fleet.is_changing(i) { fleet.target[i] } else { fleet.lane[i] }
     }
 
     /// What the leader in `lane` takes away, m/s², for the headway that the driver keeps now.
+    #[inline]
     pub(super) fn behind_m_s2(&self, i: usize, leader: u32, lane: u16) -> f64 {
         self.behind_at_m_s2(i, leader, lane, self.state.fleet.mind[i].headway_frac)
     }
 
     /// The same for another headway, as a part of the driver's own.
+    #[inline]
     pub(super) fn behind_at_m_s2(&self, i: usize, leader: u32, lane: u16, frac: f64) -> f64 {
         let seen = self.rear_and_speed(leader, lane);
         seen.map_or(0.0, |seen| self.behind_that_m_s2(i, seen, frac))
@@ -103,6 +106,7 @@ impl Engine {
     }
 
     /// The same at another speed.
+    #[inline]
     fn behind_that_at_m_s2(
         &self,
         i: usize,
@@ -122,6 +126,7 @@ impl Engine {
         self.state.fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, lane), taken)
     }
 
+    #[inline]
     pub(super) fn rear_and_speed(&self, who: u32, lane: u16) -> Option<(f64, f64)> {
         match who {
             NOBODY => None,
@@ -137,10 +142,10 @@ impl Engine {
     pub(super) fn follow_m_s2(&self, i: usize) -> Wanted {
         let fleet = &self.state.fleet;
         let (lane, driven) = (fleet.lane[i], self.driven(i));
-        let mut a = self.behind_m_s2(i, self.near.leader[i][OWN], lane);
+        let mut a = self.behind_m_s2(i, self.near.sides[i].leader[OWN], lane);
         if fleet.is_changing(i) {
             let side = self.side_of(i, driven);
-            a = a.min(self.behind_m_s2(i, self.near.leader[i][side], driven));
+            a = a.min(self.behind_m_s2(i, self.near.sides[i].leader[side], driven));
         }
         if self.map.ends_early(driven) && fleet.driver[i].exit != driven {
             let v = fleet.v_m_s[i];
@@ -168,7 +173,7 @@ impl Engine {
         }
         let frac = fleet.mind[i].headway_frac;
         let taken = |side: usize, lane: u16| {
-            let seen = self.rear_and_speed(self.near.leader[i][side], lane);
+            let seen = self.rear_and_speed(self.near.sides[i].leader[side], lane);
             seen.map_or(0.0, |seen| self.behind_that_at_m_s2(i, seen, frac, creep_m_s))
         };
         let mut a = taken(OWN, fleet.lane[i]);
@@ -180,6 +185,6 @@ impl Engine {
     }
 
     fn side_of(&self, i: usize, lane: u16) -> usize {
-        if self.near.lanes[i][LEFT] == lane { LEFT } else { RIGHT }
+        if self.near.sides[i].lanes[LEFT] == lane { LEFT } else { RIGHT }
     }
 }

@@ -59,9 +59,15 @@ pub(super) struct Wish {
 }
 
 impl Engine {
+    /// Whether anybody may have to change lanes in this tick.
+    pub(super) fn has_needs(&self) -> bool {
+        self.map.has_needs() || self.is_eventful()
+    }
+
     /// The lane change that vehicle `i` has to make, if any.
+    #[inline]
     fn need(&self, i: usize) -> Option<Need> {
-        if self.map.has_needs() || self.is_eventful() { self.need_here(i) } else { None }
+        if self.has_needs() { self.need_here(i) } else { None }
     }
 
     fn need_here(&self, i: usize) -> Option<Need> {
@@ -87,7 +93,7 @@ impl Engine {
             }
         }
         if lane != exit && self.map.ends_early(lane) && s > here.s_end_m - ahead {
-            let reach = |side: usize| match self.near.lanes[i][side] {
+            let reach = |side: usize| match self.near.sides[i].lanes[side] {
                 NO_LANE => f64::NEG_INFINITY,
                 k if self.map.is_open_to(k, exit) => self.map.lanes[k as usize].s_end_m,
                 _ => f64::NEG_INFINITY,
@@ -136,16 +142,16 @@ impl Engine {
         if desire < COOPERATES {
             return;
         }
-        let lane = self.near.lanes[i][need.side];
+        let lane = self.near.sides[i].lanes[need.side];
         if lane == NO_LANE {
             return;
         }
         let comfortable = fleet.driver[i].idm.decel_m_s2;
-        let leader = self.near.leader[i][need.side];
+        let leader = self.near.sides[i].leader[need.side];
         let taken = self.behind_at_m_s2(i, leader, lane, self.content_frac(i, desire));
         let own = fleet.driver[i].idm.lesser_m_s2(self.free_m_s2(i, fleet.lane[i]), taken);
         bounds.push((i, own.max(-comfortable)));
-        let follower = self.near.follower[i][need.side];
+        let follower = self.near.sides[i].follower[need.side];
         if follower < EGO {
             let f = follower as usize;
             let yields = self.in_lane_m_s2(f, i as u32, lane, self.content_frac(f, desire));
@@ -222,6 +228,9 @@ impl Engine {
                 [possible.map(|(lane, _)| (need.side, lane, f64::INFINITY)), None]
             }
             None => [LEFT, RIGHT].map(|side| {
+                if self.near.sides[i].lanes[side] == NO_LANE {
+                    return None;
+                }
                 let possible = self.change_m_s2(i, side, None).filter(|&(_, gain)| gain > 0.0);
                 possible.map(|(lane, gain)| (side, lane, gain))
             }),
@@ -247,11 +256,12 @@ impl Engine {
 
     /// Begins a change: the driver remembers why, and he and the new follower accept their gaps.
     fn begin(&mut self, i: usize, side: usize, lane: u16) {
-        let (leader, follower) = (self.near.leader[i][side], self.near.follower[i][side]);
+        let (leader, follower) =
+            (self.near.sides[i].leader[side], self.near.sides[i].follower[side]);
         let own_frac = self.steady_frac(i, leader, lane);
         let cut_in_on = (follower < EGO).then_some(follower as usize);
         let their_frac = cut_in_on.map(|f| self.steady_frac(f, i as u32, lane));
-        let left_behind = self.number(self.near.leader[i][OWN]);
+        let left_behind = self.number(self.near.sides[i].leader[OWN]);
         let (own_least, tick) = (self.least_frac(i), self.state.tick);
         if let (Some(f), Some(frac)) = (cut_in_on, their_frac) {
             let least = self.least_frac(f);
@@ -289,7 +299,7 @@ impl Engine {
     /// MOBIL for one side: lane and incentive, m/s², if the change is possible and safe.
     fn change_m_s2(&self, i: usize, side: usize, desire: Option<f64>) -> Option<(u16, f64)> {
         let fleet = &self.state.fleet;
-        let (lane, s) = (self.near.lanes[i][side], fleet.s_m[i]);
+        let (lane, s) = (self.near.sides[i].lanes[side], fleet.s_m[i]);
         if lane == NO_LANE || !self.map.is_open_to(lane, fleet.driver[i].exit) {
             return None;
         }
@@ -306,10 +316,11 @@ impl Engine {
         {
             return None;
         }
-        let (leader, follower) = (self.near.leader[i][side], self.near.follower[i][side]);
+        let (leader, follower) =
+            (self.near.sides[i].leader[side], self.near.sides[i].follower[side]);
         let mind = &fleet.mind[i];
         if desire.is_none()
-            && mind.would_undo(&self.minds, lane, self.state.tick, self.number(follower))
+            && mind.would_undo(&self.minds, lane, self.state.tick, || self.number(follower))
         {
             return None;
         }
@@ -331,7 +342,7 @@ impl Engine {
             own_after_m_s2: free_m_s2,
             ..Change::default()
         };
-        let old_follower = Some(self.near.follower[i][OWN]).filter(|&o| o < EGO);
+        let old_follower = Some(self.near.sides[i].follower[OWN]).filter(|&o| o < EGO);
         if let Some(o) = old_follower {
             let before = self.wanted[o as usize].accel_m_s2;
             change.old_follower_before_m_s2 = before;
@@ -350,7 +361,7 @@ impl Engine {
             fleet.driver[i].idm.lesser_m_s2(self.known_free_m_s2(i, lane), taken)
         };
         if let Some(o) = old_follower {
-            let (o, ahead) = (o as usize, self.near.leader[i][OWN]);
+            let (o, ahead) = (o as usize, self.near.sides[i].leader[OWN]);
             let after = known_in_lane(o, ahead, fleet.lane[i], fleet.mind[o].headway_frac);
             change.old_follower_after_m_s2 = after.max(change.old_follower_before_m_s2);
             if !pays(&change) {

@@ -21,7 +21,7 @@ use super::fleet::Fleet;
 use super::happenings::{Block, Plot, Rushing};
 use super::human::{Mind, Minds};
 use super::lanes::{LaneMap, NO_LANE};
-use super::neighbours::{EGO, LEFT, Neighbourhood, OWN, RIGHT, Seen};
+use super::neighbours::{EGO, LEFT, Neighbourhood, OWN, RIGHT, Seen, Sides};
 use super::window::{FAR_TICKS, Near, Stride};
 use super::workers::{InTurn, PIECE, Workers, in_pieces};
 
@@ -236,7 +236,7 @@ impl Engine {
         let workers = Arc::clone(&self.workers);
         let piece = self.piece;
         let acting = self.settle();
-        self.find_neighbours(&*workers, piece, acting.clone());
+        self.find_neighbours(&*workers, piece, &acting);
         let mut wanted = std::mem::take(&mut self.wanted);
         self.state.fleet.fit(&mut wanted, Wanted::default());
         // Who does not act goes on as before.
@@ -244,12 +244,14 @@ impl Engine {
         for i in (looked_at.start..acting.start).chain(acting.end..looked_at.end) {
             wanted[i] = Wanted { accel_m_s2: self.state.fleet.a_m_s2[i], free_m_s2: None };
         }
-        let first = acting.start;
+        let (first, has_needs) = (acting.start, self.has_needs());
         let mut bounds = std::mem::take(&mut self.bounds);
         let follow = |from: usize, wanted: &mut [Wanted], bounds: &mut Vec<(usize, f64)>| {
             for (i, wanted) in (from..).zip(wanted) {
                 *wanted = self.follow_m_s2(i);
-                self.make_room(i, bounds);
+                if has_needs {
+                    self.make_room(i, bounds);
+                }
             }
         };
         if acting.len() <= piece {
@@ -292,9 +294,9 @@ impl Engine {
         self.wishes = wishes;
     }
 
-    fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize, acting: Range<usize>) {
+    fn find_neighbours(&mut self, workers: &dyn Workers, piece: usize, acting: &Range<usize>) {
         let (fleet, map, tick) = (&self.state.fleet, &*self.map, self.state.tick);
-        let (near, range) = (self.near(), self.looked_at(&acting));
+        let (near, over) = (self.near(), self.looked_at(acting));
         let (eventful, has_needs) = (self.is_eventful(), map.has_needs());
         let looks_aside = |i: usize| {
             !near.contains(&i)
@@ -304,7 +306,7 @@ impl Engine {
                 || eventful
         };
         let seen = Seen { fleet, map, ego: &self.ego };
-        self.near.find(seen, range, workers, piece, looks_aside);
+        self.near.find(seen, &over, acting, workers, piece, looks_aside);
     }
 
     /// Moves every vehicle to the end of the tick, then lets vehicles out and in.
@@ -391,7 +393,7 @@ impl Engine {
 
     /// Memory of a vehicle, bytes: state, what its driver wants, neighbours.
     pub(crate) fn bytes_per_vehicle() -> usize {
-        Fleet::BYTES + size_of::<Wanted>() + 3 * size_of::<u16>() + 6 * size_of::<u32>()
+        Fleet::BYTES + size_of::<Wanted>() + size_of::<Sides>()
     }
 
     /// Smallest bumper-to-bumper gap to a leader in any lane that a vehicle takes up, m; call it
@@ -399,10 +401,11 @@ impl Engine {
     pub(crate) fn min_gap_m(&self) -> f64 {
         let fleet = &self.state.fleet;
         let mut least = f64::INFINITY;
-        let known = self.near.lanes.len().min(self.near().end);
+        let known = self.near.sides.len().min(self.near().end);
         for i in self.near().start..known {
             for side in [OWN, LEFT, RIGHT] {
-                let (lane, leader) = (self.near.lanes[i][side], self.near.leader[i][side]);
+                let (lane, leader) =
+                    (self.near.sides[i].lanes[side], self.near.sides[i].leader[side]);
                 if leader < EGO && lane != NO_LANE && fleet.occupies(i, lane) {
                     least = least.min(fleet.rear_m(leader as usize) - fleet.s_m[i]);
                 }

@@ -78,8 +78,10 @@ impl Fleet {
 
     /// Gives what is worked out about each vehicle its length, with the fleet's room to grow.
     pub(crate) fn fit<T: Clone>(&self, values: &mut Vec<T>, value: T) {
-        values.reserve(self.s_m.capacity().saturating_sub(values.len()));
-        values.resize(self.len(), value);
+        if values.len() != self.len() {
+            values.reserve(self.s_m.capacity().saturating_sub(values.len()));
+            values.resize(self.len(), value);
+        }
     }
 
     pub(crate) fn len(&self) -> usize {

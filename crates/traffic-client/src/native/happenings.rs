@@ -259,7 +259,7 @@ impl Engine {
     pub(super) fn happening_need(&self, i: usize) -> Option<(usize, f64)> {
         let fleet = &self.state.fleet;
         let (lane, s_m) = (fleet.lane[i], fleet.s_m[i]);
-        let sides = |side: usize| self.near.lanes[i][side];
+        let sides = |side: usize| self.near.sides[i].lanes[side];
         if let Some(block) = self.block_ahead(i, lane) {
             let reach = |side: usize| match sides(side) {
                 NO_LANE => f64::NEG_INFINITY,

@@ -194,12 +194,12 @@ impl Mind {
         minds: &Minds,
         lane: u16,
         tick: u64,
-        follower: Option<u64>,
+        follower: impl Fn() -> Option<u64>,
     ) -> bool {
         let last = &self.last_change;
-        let recent = tick < last.at_tick + minds.keep_lane_ticks;
-        let overtaken = last.behind.is_some() && last.behind == follower;
-        last.from == lane && recent && !overtaken
+        let recent = || tick < last.at_tick + minds.keep_lane_ticks;
+        let overtaken = || last.behind.is_some() && last.behind == follower();
+        last.from == lane && recent() && !overtaken()
     }
 }
 
@@ -230,12 +230,12 @@ mod tests {
     fn a_change_is_undone_only_once_its_cause_is_gone() {
         let minds = Minds::new(&HumanConfig::default(), 1, 0.1, 5);
         let mut mind = Mind::default();
-        assert!(!mind.would_undo(&minds, 0, 10, None), "he never changed");
+        assert!(!mind.would_undo(&minds, 0, 10, || None), "he never changed");
         mind.changed(0, 100, Some(4));
-        assert!(mind.would_undo(&minds, 0, 200, Some(9)), "the slow one is still ahead");
-        assert!(!mind.would_undo(&minds, 0, 200, Some(4)), "it was overtaken");
-        assert!(!mind.would_undo(&minds, 2, 200, Some(9)), "that is another lane");
-        assert!(!mind.would_undo(&minds, 0, 250, Some(9)), "15 s are over");
+        assert!(mind.would_undo(&minds, 0, 200, || Some(9)), "the slow one is still ahead");
+        assert!(!mind.would_undo(&minds, 0, 200, || Some(4)), "it was overtaken");
+        assert!(!mind.would_undo(&minds, 2, 200, || Some(9)), "that is another lane");
+        assert!(!mind.would_undo(&minds, 0, 250, || Some(9)), "15 s are over");
     }
 
     #[test]
