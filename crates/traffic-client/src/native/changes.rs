@@ -335,7 +335,7 @@ impl Engine {
         };
         let pays = |c: &Change| desire.is_some() || mobil.incentive_m_s2(c, side == RIGHT) > 0.0;
         // Most changes do not pay even if nobody is ahead there, nobody minds, and whoever is behind
-        // gains all there is to gain: what is less than that is worked out only where it may matter.
+        // had a free road: what is less than that is worked out only where it may matter.
         let free_m_s2 = self.known_free_m_s2(i, lane);
         let mut change = Change {
             own_before_m_s2: self.wanted[i].accel_m_s2,
@@ -346,7 +346,8 @@ impl Engine {
         if let Some(o) = old_follower {
             let before = self.wanted[o as usize].accel_m_s2;
             change.old_follower_before_m_s2 = before;
-            change.old_follower_after_m_s2 = before.max(fleet.driver[o as usize].idm.accel_m_s2);
+            let at_most = self.known_free_m_s2(o as usize, fleet.lane[i]);
+            change.old_follower_after_m_s2 = before.max(at_most);
         }
         if !pays(&change) {
             return None;
