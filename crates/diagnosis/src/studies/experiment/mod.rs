@@ -109,20 +109,25 @@ pub fn suggest(
     let planned = plan(truck, known.drives, seed, executor)?;
     let prepare = |d: &[Drive]| d.iter().map(|d| Prepared::new(d, plant)).collect::<Vec<_>>();
     let all: Vec<Drive> = planned.iter().flatten().cloned().collect();
-    let reference: Reference = match (known.baseline, known.drives) {
-        (Some(b), _) => Problem::learn(plant, prepare(&b.drives), true, executor)?.reference,
-        (None, Some(d)) => Problem::learn(plant, prepare(&d.drives), false, executor)?.reference,
-        (None, None) => Problem::learn(plant, prepare(&all), false, executor)?.reference,
+    let learn = |d: &[Drive], clean| Problem::learn(plant, prepare(d), clean, executor);
+    let reference: Option<Reference> = match (known.baseline, known.drives) {
+        (Some(b), _) => Some(learn(&b.drives, true)?.reference),
+        (None, Some(d)) => Some(learn(&d.drives, false)?.reference),
+        (None, None) => None,
+    };
+    let problem = match reference {
+        Some(reference) => Problem::with(plant, prepare(&all), reference, executor)?,
+        None => learn(&all, false)?,
     };
     let sensitivities = Sensitivities::of(&ids);
     let there = match known.drives {
         Some(d) => {
-            let problem = Problem::with(plant, prepare(&d.drives), reference.clone(), executor)?;
-            sensitivities.information(&problem, |_| true)
+            let reference = problem.reference.clone();
+            let there = Problem::with(plant, prepare(&d.drives), reference, executor)?;
+            sensitivities.information(&there, |_| true)
         }
         None => sensitivities.none(),
     };
-    let problem = Problem::with(plant, prepare(&all), reference, executor)?;
     let mut first = 0;
     let mut offers: Vec<Offer> = Vec::new();
     for (m, drives) in MANOEUVRES.iter().zip(&planned) {
