@@ -87,7 +87,7 @@ impl Problem<'_> {
     /// The same with the directions from another point.
     pub(crate) fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram {
         let parts = self.each(|i| {
-            let mut lines = vec![self.as_driven(i, theta, from)];
+            let mut lines = vec![self.at(i, theta)];
             lines.extend(directions.iter().map(|d| self.line(i, from, d)));
             self.marginal(i, &lines, from)
         });
@@ -111,7 +111,7 @@ impl Problem<'_> {
         columns: &(dyn Fn(usize) -> Vec<Vec<f64>> + Sync),
     ) -> Gram {
         let parts = self.each(|i| {
-            let mut lines = vec![self.as_driven(i, theta, theta)];
+            let mut lines = vec![self.at(i, theta)];
             lines.extend(directions.iter().map(|d| self.line(i, theta, d)));
             lines.extend(columns(i).into_iter().map(|c| Self::column(module, c)));
             self.marginal(i, &lines, &self.reference.theta)

@@ -85,8 +85,7 @@ impl Problem<'_> {
         let systems: Vec<(DMatrix<f64>, DVector<f64>)> = (0..self.drives.len())
             .map(|i| {
                 let n = &self.nuisance[i];
-                let here = self.as_driven(i, &self.reference.theta, &self.reference.theta);
-                (n.scaled(), self.against(i, &here))
+                (n.scaled(), self.against(i, &n.base))
             })
             .collect();
         let count = self.drives.len() as f64;

@@ -15,7 +15,6 @@ mod moved;
 pub(crate) mod noise;
 mod nuisance;
 mod random;
-mod second_order;
 mod signals;
 pub(crate) mod stats;
 mod white;
@@ -83,7 +82,6 @@ pub(crate) struct Problem<'a> {
     common: Arc<Vec<DMatrix<f64>>>,
     kept: Vec<Kept>,
     shifts: Vec<moved::Shifts>,
-    bends: Vec<second_order::Bends>,
     hats: hat::Hats,
     executor: &'a dyn Executor,
 }
@@ -219,7 +217,6 @@ impl<'a> Problem<'a> {
     ) -> Result<Self, DiagnosisError> {
         let kept = drives.iter().map(|_| Kept::default()).collect();
         let shifts = drives.iter().map(|_| moved::Shifts::default()).collect();
-        let bends = drives.iter().map(|_| second_order::Bends::default()).collect();
         let mut problem = Self {
             plant,
             drives,
@@ -229,7 +226,6 @@ impl<'a> Problem<'a> {
             common: Arc::default(),
             kept,
             shifts,
-            bends,
             hats: hat::Hats::default(),
             executor,
         };

@@ -78,8 +78,6 @@ impl Problem<'_> {
             self.slow = self.each(over);
         }
         self.shifts.iter().for_each(super::moved::Shifts::renew);
-        self.kept.iter().for_each(super::signals::Kept::unbend);
-        self.bends.iter().for_each(super::second_order::Bends::renew);
         let directions = nuisance_directions(&self.reference.tolerance);
         let sigma: Vec<f64> =
             directions.iter().map(|d| self.reference.tolerance[d.p as usize]).collect();
@@ -151,13 +149,12 @@ impl Problem<'_> {
     /// Posterior mean of a drive's tolerances at the reference, in their sigmas.
     pub(super) fn nuisance_mean(&self, i: usize) -> Vec<f64> {
         let n = &self.nuisance[i];
-        let here = self.as_driven(i, &self.reference.theta, &self.reference.theta);
-        n.factor.solve(&self.against(i, &here)).iter().copied().collect()
+        n.factor.solve(&self.against(i, &n.base)).iter().copied().collect()
     }
 
     /// What is left of drive `i`.
     pub(crate) fn rest(&self, i: usize, at: &Point) -> Rest {
-        let mut lines = vec![self.as_driven(i, &at.theta, &at.theta)];
+        let mut lines = vec![self.at(i, &at.theta)];
         lines.extend(at.directions.iter().map(|d| self.line(i, &at.theta, d)));
         let tolerances: Vec<DVector<f64>> = lines.iter().map(|l| self.against(i, l)).collect();
         let mut adjoint: [Vec<(usize, Vec<f64>)>; MODULES] = Default::default();

@@ -26,9 +26,6 @@ pub(super) struct Signals {
 /// What one direction, or one point, does to the groups that it touches.
 pub(super) type Line = Vec<Arc<Signals>>;
 
-/// What is added to the residuals of every group.
-pub(super) type Bend = Vec<Option<Vec<Part>>>;
-
 type Key = Vec<u64>;
 
 /// Raw samples kept per drive.
@@ -56,12 +53,6 @@ impl Signals {
     /// The same, to be whitened again.
     pub(super) fn renewed(&self) -> Arc<Self> {
         Arc::new(Self::new(self.group, self.residual, self.raw.clone()))
-    }
-
-    /// Residuals with something added, part by part.
-    fn plus(&self, added: &[Part]) -> Self {
-        let raw = self.raw.iter().zip(added).map(|(a, b)| a.plus(b)).collect();
-        Self::new(self.group, self.residual, Arc::new(raw))
     }
 
     /// What it changes by to `other` per `scale`, as a sensitivity.
@@ -103,16 +94,6 @@ impl Kept {
             store.entries.values_mut().for_each(|s| *s = s.renewed());
         }
     }
-
-    /// Tolerances have changed: what is added to residuals is other.
-    pub(super) fn unbend(&self) {
-        if let Ok(mut store) = self.0.lock() {
-            let bent = |key: &Key| key[0] >= GROUPS.len() as u64;
-            store.entries.retain(|key, _| !bent(key));
-            store.order.retain(|key| !bent(key));
-            store.samples = store.entries.values().map(|s| s.samples()).sum();
-        }
-    }
 }
 
 /// Values of the parameters that a group sees.
@@ -148,45 +129,6 @@ impl Problem<'_> {
     /// Residuals of all groups at `theta`.
     pub(super) fn at(&self, i: usize, theta: &Theta) -> Line {
         GROUPS.iter().map(|g| self.point(i, *g, theta)).collect()
-    }
-
-    /// Residuals of all groups at `theta` with what is `added`, which is `known_by` these numbers.
-    pub(super) fn bent(&self, i: usize, theta: &Theta, added: &Bend, known_by: &[u64]) -> Line {
-        let of = |(g, added): (&Group, &Option<Vec<Part>>)| {
-            let plain = self.point(i, *g, theta);
-            let Some(added) = added else { return plain };
-            let key: Key = core::iter::once((GROUPS.len() + *g as usize) as u64)
-                .chain(seen(*g, theta))
-                .chain(known_by.iter().copied())
-                .collect();
-            if let Some(kept) = self.kept[i].get(&key) {
-                return kept;
-            }
-            let signals = Arc::new(plain.plus(added));
-            self.kept[i].put(key, signals.clone());
-            signals
-        };
-        GROUPS.iter().zip(added).map(of).collect()
-    }
-
-    /// Rows that a group's residuals at the reference, taken along columns, miss of those at `there`.
-    pub(super) fn bend_of(
-        &self,
-        i: usize,
-        group: Group,
-        there: &Theta,
-        columns: &[(f64, &Signals)],
-    ) -> Vec<Part> {
-        let mut raw = self.replay_one(i, group, there);
-        let plain = self.point(i, group, &self.reference.theta);
-        for (k, part) in raw.iter_mut().enumerate() {
-            part.rows.iter_mut().zip(&plain.raw[k].rows).for_each(|(x, b)| *x -= b);
-            for (by, column) in columns {
-                let column = &column.raw[k];
-                part.rows.iter_mut().zip(&column.rows).for_each(|(x, c)| *x += by * c);
-            }
-        }
-        raw
     }
 
     /// Sensitivities along a direction from `theta`, of the groups that it touches.
