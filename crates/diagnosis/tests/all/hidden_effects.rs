@@ -193,8 +193,6 @@ fn a_light_wind_is_fitted_whatever_its_signs() {
     }
 }
 
-/// A side force that acts further forward than the truck file says turned the tractor more, and was
-/// a wind of twice the speed with softer tyres beside it.
 /// Boost that comes over a part of the load was fitted with a threshold: the lag came out 15 to 35 % too
 /// short, and what was left made the verdict `ambiguous` with a function of the pedal.
 #[test]
@@ -236,6 +234,8 @@ fn the_gain_is_that_of_the_truck_that_is_written() {
     assert!(after < 0.8 * before, "{before} {after}: else the test tells nothing");
 }
 
+/// A side force that acts further forward than the truck file says turned the tractor more, and was
+/// a wind of twice the speed with softer tyres beside it.
 #[test]
 fn a_wind_that_acts_further_forward_is_not_a_stronger_wind() {
     let shape = Shape([0.4, 0.9, 0.5, 0.5]);

@@ -344,7 +344,7 @@ impl Engine {
     /// How far the fan is on at a coolant temperature, 0 to 1, given how far it was before: play between
     /// the ramp on which it comes and the one, a hysteresis below, on which it goes.
     #[must_use]
-    pub fn fan_on_frac(&self, before: f64, coolant_k: f64) -> f64 {
+    pub fn fan_on_frac(&self, before_frac: f64, coolant_k: f64) -> f64 {
         let p = &self.parameters;
         let over = |from_k: f64| {
             if p.fan_band_k > 0.0 {
@@ -355,7 +355,7 @@ impl Engine {
                 0.0
             }
         };
-        before.clamp(over(p.fan_on_k), over(p.fan_on_k - p.fan_hysteresis_k))
+        before_frac.clamp(over(p.fan_on_k), over(p.fan_on_k - p.fan_hysteresis_k))
     }
 
     /// Torque that the auxiliaries take from the crank, Nm.
