@@ -136,13 +136,14 @@ pub(crate) fn causes(
     compared.model(Vec::new(), 0.0);
     let without = evidence.each_left_out(fit, empty);
     let nats = <dyn Evidence>::lost(fit, &without);
+    let as_driven = evidence.lost_as_driven(fit, &without);
     let mut out = Vec::new();
     for (i, (h, without)) in fit.set.iter().zip(&without).enumerate() {
         let hyp = &CATALOGUE[*h];
         let lost_nats = nats[i];
         let (mut confused_with, mut rivalled) = (Vec::new(), false);
         if let Some(fewer) = without {
-            let worth = evidence.worth(fit, i, &nats);
+            let worth = evidence.worth(fit, i, &as_driven);
             compared.model(ids(&fewer.set), fit.log_z - worth);
             compared.functions(i, fewer, bare);
             (confused_with, rivalled) = compared.rivals(i, fewer, lost_nats, open);
@@ -176,7 +177,7 @@ pub(crate) fn causes(
             kind: hyp.kind(),
             sentence,
             parameters,
-            evidence: lost_nats,
+            evidence: as_driven[i],
             probability: 0.0,
             confused_with,
         };

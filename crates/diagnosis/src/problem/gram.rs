@@ -91,6 +91,15 @@ impl Problem<'_> {
             lines.extend(directions.iter().map(|d| self.line(i, from, d)));
             self.marginal(i, &lines, from)
         });
+        self.with_moved(parts, from)
+    }
+
+    /// The Gram matrices of all drives whose tolerances were taken at `from`.
+    pub(super) fn with_moved(
+        &self,
+        parts: Vec<(DMatrix<f64>, DMatrix<f64>)>,
+        from: &Theta,
+    ) -> Gram {
         let mut out = self.together(parts.into_iter());
         let own: Option<Vec<_>> = (0..self.drives.len())
             .map(|i| Some(self.moved(i, from)?.information.clone()))
@@ -130,7 +139,12 @@ impl Problem<'_> {
 
     /// Gram matrix of given lines in the metric `M` of a drive, its tolerances taken at `from`, and
     /// their products with the common effects.
-    fn marginal(&self, i: usize, lines: &[Line], from: &Theta) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub(super) fn marginal(
+        &self,
+        i: usize,
+        lines: &[Line],
+        from: &Theta,
+    ) -> (DMatrix<f64>, DMatrix<f64>) {
         let mut g = self.inner_products(i, lines);
         let moved = self.moved(i, from);
         let moved = moved.as_deref();

@@ -15,6 +15,7 @@ mod moved;
 pub(crate) mod noise;
 mod nuisance;
 mod random;
+mod second_order;
 mod signals;
 pub(crate) mod stats;
 mod white;
@@ -22,6 +23,7 @@ mod white;
 pub(crate) use gram::Gram;
 pub(crate) use moved::moves;
 pub(crate) use nuisance::Rest;
+pub(crate) use second_order::is_smooth;
 
 use means::means_apart;
 #[cfg(test)]

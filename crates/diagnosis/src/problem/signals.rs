@@ -55,6 +55,12 @@ impl Signals {
         Arc::new(Self::new(self.group, self.residual, self.raw.clone()))
     }
 
+    /// Residuals with something added, part by part.
+    pub(super) fn plus(&self, added: &[Part]) -> Self {
+        let raw = self.raw.iter().zip(added).map(|(a, b)| a.plus(b)).collect();
+        Self::new(self.group, self.residual, Arc::new(raw))
+    }
+
     /// What it changes by to `other` per `scale`, as a sensitivity.
     pub(super) fn change_to(&self, other: &Self, scale: f64) -> Arc<Self> {
         let both = self.raw.iter().zip(other.raw.iter());
@@ -129,6 +135,26 @@ impl Problem<'_> {
     /// Residuals of all groups at `theta`.
     pub(super) fn at(&self, i: usize, theta: &Theta) -> Line {
         GROUPS.iter().map(|g| self.point(i, *g, theta)).collect()
+    }
+
+    /// Rows that a group's residuals at the reference, taken along columns, miss of those at `there`.
+    pub(super) fn remainder(
+        &self,
+        i: usize,
+        group: Group,
+        there: &Theta,
+        columns: &[(f64, &Signals)],
+    ) -> Vec<Part> {
+        let mut raw = self.replay_one(i, group, there);
+        let plain = self.point(i, group, &self.reference.theta);
+        for (k, part) in raw.iter_mut().enumerate() {
+            part.rows.iter_mut().zip(&plain.raw[k].rows).for_each(|(x, b)| *x -= b);
+            for (by, column) in columns {
+                let column = &column.raw[k];
+                part.rows.iter_mut().zip(&column.rows).for_each(|(x, c)| *x += by * c);
+            }
+        }
+        raw
     }
 
     /// Sensitivities along a direction from `theta`, of the groups that it touches.

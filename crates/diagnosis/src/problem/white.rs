@@ -29,6 +29,14 @@ impl Part {
         Self { from, rows: rows[from..to].to_vec() }
     }
 
+    /// The sum of two whole records.
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        Self {
+            from: self.from,
+            rows: self.rows.iter().zip(&other.rows).map(|(a, b)| a + b).collect(),
+        }
+    }
+
     /// What it changes by to `other` per `scale`.
     pub(super) fn change_to(&self, other: &Self, scale: f64) -> Self {
         let end = |x: &Self| x.from + x.rows.len();

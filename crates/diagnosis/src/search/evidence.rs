@@ -24,6 +24,9 @@ pub(crate) trait Evidence {
     /// Gram matrix of the residual at `theta` and the directions from `from`.
     fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram;
 
+    /// The Gram matrix of the residual at `theta` with what tolerances do beyond their first order in it.
+    fn gram_as_driven(&self, theta: &Theta, directions: &[Direction]) -> Gram;
+
     /// The Gram matrix with residual and directions at the same point.
     fn gram(&self, theta: &Theta, directions: &[Direction]) -> Gram {
         self.gram_along(theta, theta, directions)
@@ -45,6 +48,10 @@ impl Evidence for Problem<'_> {
 
     fn gram_along(&self, theta: &Theta, from: &Theta, directions: &[Direction]) -> Gram {
         Problem::gram_along(self, theta, from, directions)
+    }
+
+    fn gram_as_driven(&self, theta: &Theta, directions: &[Direction]) -> Gram {
+        Problem::gram_as_driven(self, theta, directions)
     }
 }
 

@@ -130,7 +130,7 @@ impl dyn Evidence + '_ {
         let mut fit = fit;
         loop {
             let fewer = self.each_left_out(&fit, empty);
-            let nats = Self::lost(&fit, &fewer);
+            let nats = self.lost_as_driven(&fit, &fewer);
             let doubtful = (0..fit.set.len()).filter(|i| {
                 let hyp = &CATALOGUE[fit.set[*i]];
                 let size = hyp.size(&fit.theta, self.zero()).abs();

@@ -8,6 +8,7 @@
 
 use crate::causes::hypothesis::{CATALOGUE, Hypothesis};
 use crate::causes::param::{PARAMS, Spec, Theta};
+use crate::problem::{Gram, is_smooth};
 use crate::replay::affects;
 use crate::search::decisions::{AHEAD, MIN_EVIDENCE, PRIOR_CAUSE, RANKED};
 use crate::search::evidence::Evidence;
@@ -261,6 +262,23 @@ impl dyn Evidence + '_ {
     pub(crate) fn lost(fit: &Fit, without: &[Option<Fit>]) -> Vec<f64> {
         let of = |f: &Option<Fit>| fit.log_z - f.as_ref().map_or(0.0, |f| f.log_z);
         without.iter().map(of).collect()
+    }
+
+    /// The same, of causes that a tolerance could be, less what tolerances take beyond their first order.
+    pub(crate) fn lost_as_driven(&self, fit: &Fit, without: &[Option<Fit>]) -> Vec<f64> {
+        let falls = |theta: &Theta| {
+            let left = |gram: Gram| gram.total().2;
+            (left(self.gram(theta, &[])) - left(self.gram_as_driven(theta, &[]))).max(0.0)
+        };
+        let taken = |f: &Option<Fit>| {
+            let theta = f.as_ref().map_or(self.zero(), |f| &f.theta);
+            0.5 * (falls(theta) - falls(&fit.theta)).max(0.0)
+        };
+        let could_be = |h: usize| CATALOGUE[h].sizes.iter().any(|p| is_smooth(*p));
+        let of = |((nats, f), h): ((f64, &Option<Fit>), &usize)| {
+            if could_be(*h) { nats - taken(f) } else { nats }
+        };
+        Self::lost(fit, without).into_iter().zip(without).zip(&fit.set).map(of).collect()
     }
 }
 

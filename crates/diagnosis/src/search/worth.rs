@@ -1,7 +1,8 @@
 //! What the evidence of a cause is worth against the ways in which it may not be there.
 //!
-//! Without a cause its size is still not nothing to the drives. Three models have it so, and what the
-//! cause is worth is what it adds to the best of them:
+//! Without a cause its size is still not nothing to the drives. What tolerances would do beyond their first
+//! order is taken off before (`lost_as_driven`): windy days are no wind. Three more models have it so, and
+//! what the cause is worth is what it adds to the best of them:
 //!
 //! | why a size shows | the size without the cause | worth of `E` nats |
 //! |---|---|---|
@@ -96,7 +97,7 @@ impl dyn Evidence + '_ {
                 }
             }
         }
-        let gram = self.gram(self.zero(), &directions);
+        let gram = self.gram_as_driven(self.zero(), &directions);
         let scores = gram.scores(&DVector::zeros(directions.len()));
         let of = |i: usize| {
             let own = (0..owner.len()).filter(|j| owner[*j] == i);

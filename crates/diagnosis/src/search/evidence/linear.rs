@@ -98,6 +98,10 @@ impl Evidence for LinearProblem {
     fn gram_along(&self, theta: &Theta, _: &Theta, directions: &[Direction]) -> Gram {
         Gram::without_common(self.drives.iter().map(|d| d.gram(theta, directions)).collect())
     }
+
+    fn gram_as_driven(&self, theta: &Theta, directions: &[Direction]) -> Gram {
+        self.gram(theta, directions)
+    }
 }
 
 impl Gram {
