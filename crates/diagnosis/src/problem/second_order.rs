@@ -17,6 +17,8 @@
 //! by. Not the tolerances of sampled delays, places on a map and what begins at a threshold: beyond their
 //! kinks a step is no better than none.
 
+use std::sync::Arc;
+
 use nalgebra::DVector;
 
 use super::signals::{Line, Signals};
@@ -92,8 +94,8 @@ impl Problem<'_> {
             let columns: Vec<(f64, &Signals)> = reach.flat_map(column).collect();
             (!columns.is_empty()).then(|| self.remainder(i, *group, &there, &columns))
         };
-        let of = |(group, plain): (&Group, &std::sync::Arc<Signals>)| match remainder(group) {
-            Some(added) => std::sync::Arc::new(plain.plus(&added)),
+        let of = |(group, plain): (&Group, &Arc<Signals>)| match remainder(group) {
+            Some(added) => Arc::new(plain.plus(&added)),
             None => plain.clone(),
         };
         GROUPS.iter().zip(&line).map(of).collect()

@@ -270,11 +270,12 @@ impl dyn Evidence + '_ {
             let left = |gram: Gram| gram.total().2;
             (left(self.gram(theta, &[])) - left(self.gram_as_driven(theta, &[]))).max(0.0)
         };
+        let could_be = |h: usize| CATALOGUE[h].sizes.iter().any(|p| is_smooth(*p));
+        let beside = if fit.set.iter().any(|h| could_be(*h)) { falls(&fit.theta) } else { 0.0 };
         let taken = |f: &Option<Fit>| {
             let theta = f.as_ref().map_or(self.zero(), |f| &f.theta);
-            0.5 * (falls(theta) - falls(&fit.theta)).max(0.0)
+            0.5 * (falls(theta) - beside).max(0.0)
         };
-        let could_be = |h: usize| CATALOGUE[h].sizes.iter().any(|p| is_smooth(*p));
         let of = |((nats, f), h): ((f64, &Option<Fit>), &usize)| {
             if could_be(*h) { nats - taken(f) } else { nats }
         };

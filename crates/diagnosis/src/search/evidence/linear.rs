@@ -1,8 +1,9 @@
-//! Evidence of a few given matrices: residuals that fall linearly with the sizes of causes.
+//! Evidence of a few given matrices: residuals that fall linearly with the sizes of causes, and with
+//! tolerances that may have squares.
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use super::Evidence;
 use crate::causes::hypothesis::CATALOGUE;
@@ -18,6 +19,8 @@ pub(crate) struct LinearDrive {
     pub(crate) columns: Vec<(P, Vec<f64>)>,
     /// Rows of one standard deviation of each tolerance.
     pub(crate) tolerances: Vec<Vec<f64>>,
+    /// Rows of the square of each, where it has one.
+    pub(crate) squares: Vec<Vec<f64>>,
 }
 
 /// Drives given as matrices.
@@ -37,6 +40,10 @@ impl LinearProblem {
     pub(crate) fn cause(id: &str) -> usize {
         CATALOGUE.iter().position(|h| h.id == id).unwrap()
     }
+}
+
+fn rows_of(lines: &[Vec<f64>]) -> DMatrix<f64> {
+    DMatrix::from_fn(lines[0].len(), lines.len(), |i, j| lines[j][i])
 }
 
 impl LinearDrive {
@@ -62,17 +69,29 @@ impl LinearDrive {
         r
     }
 
-    fn gram(&self, theta: &Theta, directions: &[Direction]) -> DMatrix<f64> {
-        let mut lines = vec![self.residual_at(theta)];
+    /// The residual without the squares of the most probable tolerances.
+    fn as_driven(&self, theta: &Theta) -> Vec<f64> {
+        let mut r = self.residual_at(theta);
+        if self.squares.is_empty() {
+            return r;
+        }
+        let z = rows_of(&self.tolerances);
+        let q = self.tolerances.len();
+        let factor = (DMatrix::identity(q, q) + z.transpose() * &z).cholesky().unwrap();
+        let most_probable = factor.solve(&(z.transpose() * DVector::from_column_slice(&r)));
+        for (square, z) in self.squares.iter().zip(most_probable.iter()) {
+            r.iter_mut().zip(square).for_each(|(r, x)| *r -= z * z * x);
+        }
+        r
+    }
+
+    fn gram(&self, residual: Vec<f64>, directions: &[Direction]) -> DMatrix<f64> {
+        let mut lines = vec![residual];
         lines.extend(directions.iter().map(|d| self.under(self.column(d.p), d.hat)));
-        let of = |lines: &[Vec<f64>]| {
-            let rows = self.residual.len();
-            DMatrix::from_fn(rows, lines.len(), |i, j| lines[j][i])
-        };
-        let x = of(&lines);
+        let x = rows_of(&lines);
         let mut g = x.transpose() * &x;
         if !self.tolerances.is_empty() {
-            let z = of(&self.tolerances);
+            let z = rows_of(&self.tolerances);
             let zx = z.transpose() * &x;
             let q = self.tolerances.len();
             let factor = (DMatrix::identity(q, q) + z.transpose() * &z).cholesky().unwrap();
@@ -96,11 +115,13 @@ impl Evidence for LinearProblem {
     }
 
     fn gram_along(&self, theta: &Theta, _: &Theta, directions: &[Direction]) -> Gram {
-        Gram::without_common(self.drives.iter().map(|d| d.gram(theta, directions)).collect())
+        let of = |d: &LinearDrive| d.gram(d.residual_at(theta), directions);
+        Gram::without_common(self.drives.iter().map(of).collect())
     }
 
     fn gram_as_driven(&self, theta: &Theta, directions: &[Direction]) -> Gram {
-        self.gram(theta, directions)
+        let of = |d: &LinearDrive| d.gram(d.as_driven(theta), directions);
+        Gram::without_common(self.drives.iter().map(of).collect())
     }
 }
 
