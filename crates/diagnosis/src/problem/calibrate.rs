@@ -43,14 +43,7 @@ impl Reference {
 impl Problem<'_> {
     /// Raw residuals of a drive after its tolerances are taken out.
     pub(super) fn without_nuisance(&self, i: usize, z: &[f64]) -> Residuals {
-        let d = &self.drives[i];
-        let mut t = self.reference.theta;
-        for (s, z) in nuisance_directions(&self.reference.tolerance).iter().zip(z) {
-            let x = &mut t[s.p as usize];
-            *x = (*x + z * self.reference.tolerance[s.p as usize])
-                .clamp(s.p.spec().lo, s.p.spec().hi);
-        }
-        replay(d, self.plant, &t)
+        replay(&self.drives[i], self.plant, &self.off_by(z))
     }
 
     /// One parameter after the other, in halving steps: delays of sampled signals have a kink at

@@ -8,6 +8,7 @@ use super::signals::Line;
 use super::white::Whitened;
 use super::{Problem, inner, nuisance_directions, rows};
 use crate::DiagnosisError;
+use crate::causes::param::Theta;
 use crate::problem::course::Point;
 use crate::replay::MODULES;
 
@@ -148,8 +149,25 @@ impl Problem<'_> {
 
     /// Posterior mean of a drive's tolerances at the reference, in their sigmas.
     pub(super) fn nuisance_mean(&self, i: usize) -> Vec<f64> {
-        let n = &self.nuisance[i];
-        n.factor.solve(&self.against(i, &n.base)).iter().copied().collect()
+        self.most_probable(i, &self.nuisance[i].base, &self.reference.theta).as_slice().to_vec()
+    }
+
+    /// The same where its residuals at `theta` are `line`.
+    pub(super) fn most_probable(&self, i: usize, line: &Line, theta: &Theta) -> DVector<f64> {
+        let moved = self.moved(i, theta);
+        let mut z = self.against_at(i, line, moved.as_deref());
+        moved.as_ref().map_or(&self.nuisance[i].factor, |m| &m.factor).solve_mut(&mut z);
+        z
+    }
+
+    /// The reference off by tolerances in their sigmas, within the bounds of each.
+    pub(super) fn off_by(&self, z: &[f64]) -> Theta {
+        let mut t = self.reference.theta;
+        for (d, z) in nuisance_directions(&self.reference.tolerance).iter().zip(z) {
+            let (spec, x) = (d.p.spec(), &mut t[d.p as usize]);
+            *x = (*x + z * self.reference.tolerance[d.p as usize]).clamp(spec.lo, spec.hi);
+        }
+        t
     }
 
     /// What is left of drive `i`.

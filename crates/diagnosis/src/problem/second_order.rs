@@ -19,8 +19,6 @@
 
 use std::sync::Arc;
 
-use nalgebra::DVector;
-
 use super::signals::{Line, Signals};
 use super::{Direction, Gram, Problem, nuisance_directions};
 use crate::causes::param::{P, Theta};
@@ -72,18 +70,11 @@ impl Problem<'_> {
         let smooth: Vec<usize> =
             (0..directions.len()).filter(|j| is_smooth(directions[*j].p)).collect();
         let line = self.at(i, theta);
-        let moved = self.moved(i, theta);
-        let mut z: DVector<f64> = self.against_at(i, &line, moved.as_deref());
-        moved.as_ref().map_or(&nuisance.factor, |m| &m.factor).solve_mut(&mut z);
+        let z = self.most_probable(i, &line, theta);
         let most = smooth.iter().map(|j| z[*j].abs()).fold(MOST_DEVIATIONS, f64::max);
-        let zero = &self.reference.theta;
-        let mut there = *zero;
-        for j in &smooth {
-            let spec = directions[*j].p.spec();
-            let x = &mut there[spec.p as usize];
-            let by = MOST_DEVIATIONS / most * z[*j] * nuisance.sigma[*j];
-            *x = (*x + by).clamp(spec.lo, spec.hi);
-        }
+        let mut day = vec![0.0; z.len()];
+        smooth.iter().for_each(|j| day[*j] = MOST_DEVIATIONS / most * z[*j]);
+        let (zero, there) = (&self.reference.theta, self.off_by(&day));
         let remainder = |group: &Group| {
             let reach = smooth.iter().filter(|j| affects(directions[**j].p).contains(group));
             let column = |j: &usize| {

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::Evidence;
 use crate::causes::hypothesis::CATALOGUE;
@@ -69,15 +69,20 @@ impl LinearDrive {
         r
     }
 
+    /// Their rows, and the Cholesky factor of `I + Z'Z`.
+    fn tolerances(&self) -> (DMatrix<f64>, Cholesky<f64, Dyn>) {
+        let (z, q) = (rows_of(&self.tolerances), self.tolerances.len());
+        let factor = (DMatrix::identity(q, q) + z.transpose() * &z).cholesky().unwrap();
+        (z, factor)
+    }
+
     /// The residual without the squares of the most probable tolerances.
     fn as_driven(&self, theta: &Theta) -> Vec<f64> {
         let mut r = self.residual_at(theta);
         if self.squares.is_empty() {
             return r;
         }
-        let z = rows_of(&self.tolerances);
-        let q = self.tolerances.len();
-        let factor = (DMatrix::identity(q, q) + z.transpose() * &z).cholesky().unwrap();
+        let (z, factor) = self.tolerances();
         let most_probable = factor.solve(&(z.transpose() * DVector::from_column_slice(&r)));
         for (square, z) in self.squares.iter().zip(most_probable.iter()) {
             r.iter_mut().zip(square).for_each(|(r, x)| *r -= z * z * x);
@@ -91,10 +96,8 @@ impl LinearDrive {
         let x = rows_of(&lines);
         let mut g = x.transpose() * &x;
         if !self.tolerances.is_empty() {
-            let z = rows_of(&self.tolerances);
+            let (z, factor) = self.tolerances();
             let zx = z.transpose() * &x;
-            let q = self.tolerances.len();
-            let factor = (DMatrix::identity(q, q) + z.transpose() * &z).cholesky().unwrap();
             g -= zx.transpose() * factor.solve(&zx);
         }
         g
