@@ -98,10 +98,11 @@ pub(crate) enum P {
     PedalLag,
     TurboWidth,
     FanBand,
+    StageLag,
 }
 
 /// Number of parameters.
-pub(crate) const PARAMS: usize = 87;
+pub(crate) const PARAMS: usize = 88;
 
 /// What is known of a parameter before any drive.
 pub(crate) struct Spec {
@@ -250,6 +251,9 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::TurboWidth, "threshold_width_frac", "1", (0.15, 0.0, 0.6, 0.03), 0.0, 0.0),
     // A viscous clutch comes over some kelvin, one of plates at once.
     s(P::FanBand, "band_k", "K", (3.0, 0.0, 12.0, 0.5), 0.0, 0.0),
+    // A demand (TSC1) comes some tenths of a second before the engine brake does, what is reported as
+    // it acts (ERC1) does not.
+    s(P::StageLag, "lag_s", "s", (0.1, -0.5, 1.0, 0.02), 0.004, 0.1),
 ];
 
 impl Spec {

@@ -9,7 +9,7 @@ use crate::problem::course::Point;
 use crate::problem::stats::evidence;
 use crate::problem::{Problem, Rest};
 use crate::replay::signal::{SIGNALS, Signal, means};
-use crate::replay::{Module, Prepared};
+use crate::replay::{Module, Prepared, beside};
 use crate::search::decisions::{RESTLESS, RESTLESS_ALONE, RHO, SCATTER_PRIOR};
 
 /// Knots of the spline.
@@ -94,11 +94,16 @@ fn means_of(x: &[f64], step: usize) -> Vec<f64> {
 }
 
 /// What a factor on a module's quantity is multiplied with: the modelled quantity per row, in the
-/// unit of the `residual`. The measured one would carry the residual's own noise.
+/// unit of the `residual`. The measured one would carry the residual's own noise, and so would the
+/// row's own model where it reads a noisy message.
 fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
     let measured = means_of(d.measured(module), module.row_step());
     let modelled = |(k, (x, r)): (usize, (&f64, &f64))| x / d.row_unit(module, k) - r;
-    measured.iter().zip(residual).enumerate().map(modelled).collect()
+    let own: Vec<f64> = measured.iter().zip(residual).enumerate().map(modelled).collect();
+    if !module.reads_noise() {
+        return own;
+    }
+    (0..own.len()).map(|k| beside(&own, k, f64::INFINITY).unwrap_or(own[k])).collect()
 }
 
 /// How much more the drives disagree about a free function than their noise says, at least 1: the
@@ -154,7 +159,7 @@ impl Problem<'_> {
     /// and signal, best first.
     pub(crate) fn shapes(&self, at: &Point) -> Vec<Shape> {
         let residuals: Vec<Rest> = self.each(|i| self.rest(i, at));
-        let mut rows_of: HashMap<(usize, usize), Vec<Vec<f64>>> = HashMap::new();
+        let mut rows_of: HashMap<(usize, bool, usize), Vec<Vec<f64>>> = HashMap::new();
         let mut out = self.parts(at, &residuals);
         for (module, size) in SEARCHED {
             let m = *module as usize;
@@ -171,7 +176,7 @@ impl Problem<'_> {
                     continue;
                 }
                 let values = rows_of
-                    .entry((module.row_step(), place))
+                    .entry((module.row_step(), module.reads_noise(), place))
                     .or_insert_with(|| self.each(|i| means(&self.drives[i], signal, *module)));
                 let form = (*module, signal, None);
                 out.extend(self.shape(at, form, (*size, excess), values, &residuals));

@@ -65,6 +65,7 @@ pub(crate) struct Longitudinal<'a> {
     torque: f64,
     friction: f64,
     engine_brake: f64,
+    engine_brake_nm: Arc<[f64]>,
     fan_w: f64,
     /// In a direct gear, and what gears whose teeth carry the power lose on top.
     efficiency: f64,
@@ -113,6 +114,7 @@ impl<'a> Longitudinal<'a> {
             torque: 1.0 + at(P::TorqueScale),
             friction: 1.0 + at(P::Friction),
             engine_brake: 1.0 + at(P::EngineBrakeScale),
+            engine_brake_nm: engine_brake_nm(d, at(P::StageLag)),
             fan_w,
             efficiency: driveline.direct_efficiency_frac() * (1.0 - at(P::DrivelineLoss)),
             mesh_loss: driveline.mesh_loss_frac + at(P::MeshLoss),
@@ -146,7 +148,8 @@ impl<'a> Longitudinal<'a> {
     pub(crate) fn acceleration<const L: usize>(&self, at: usize, v: &[f64; L]) -> [f64; L] {
         let d = self.d;
         let (indicated, friction) = (cut::<L>(&d.indicated_nm, at), cut::<L>(&d.friction_nm, at));
-        let (auxiliary, brake) = (cut::<L>(&d.auxiliary_nm, at), cut::<L>(&d.engine_brake_nm, at));
+        let auxiliary = cut::<L>(&d.auxiliary_nm, at);
+        let brake = cut::<L>(&self.engine_brake_nm, at);
         let ratio = cut::<L>(&d.ratio_1_m, at);
         let mut net: [f64; L] = lanes(|j| {
             indicated[j] * self.torque
@@ -218,6 +221,14 @@ impl<'a> Longitudinal<'a> {
             drag_n(density[j], area_m2, squared, along[j] / squared.sqrt().max(1e-9))
         })
     }
+}
+
+/// Torque of the engine brake as its stage is logged, later by the lag, Nm.
+fn engine_brake_nm(d: &Prepared, lag_s: f64) -> Arc<[f64]> {
+    d.profiles.get(Kind::EngineBrake, [lag_s], || {
+        let (nm, lag) = (&d.balance.engine_brake_nm, lag_s / Drive::STEP_S);
+        (0..nm.len()).map(|i| at_index(nm, i as f64 - lag)).collect()
+    })
 }
 
 /// Force of cold brakes at the pressure that brakes, later by the lag, N.

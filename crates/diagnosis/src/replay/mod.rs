@@ -28,6 +28,7 @@ mod smooth;
 pub(crate) use powertrain::{CRUISE_RPM, LOW_LOAD_FRAC};
 pub(crate) use prepared::Prepared;
 pub(crate) use retarder::{RETARDER_LAG_S, RETARDER_POWER_W};
+pub(crate) use smooth::beside;
 
 use crate::Plant;
 use crate::causes::param::{P, PARAMS, Theta};
@@ -105,6 +106,11 @@ impl Module {
             M::Imu => "accel_x_m_s2",
             M::Co2 => "co2_rate_g_s",
         }
+    }
+
+    /// Whether the module's model reads a message whose noise is that of its rows: the engine's torque.
+    pub(crate) fn reads_noise(self) -> bool {
+        self == M::Fuel
     }
 
     /// Samples between two rows of the module.
@@ -199,6 +205,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::EngineBrakeScale
         | P::SpeedLag
         | P::PressureLag
+        | P::StageLag
         | P::FanBand
         | P::FanWidth => &[G::Force],
         P::WindX | P::WindY | P::Crosswind => &[G::Force, G::Lateral],

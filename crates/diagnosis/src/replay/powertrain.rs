@@ -11,6 +11,7 @@ use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
 use super::rise::Rise;
+use super::smooth::beside;
 use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -142,6 +143,9 @@ pub(crate) const LOW_LOAD_FRAC: f64 = 0.3;
 /// Engine speed at which a load is a power, rpm: where highway trucks cruise.
 pub(crate) const CRUISE_RPM: f64 = 1_250.0;
 
+/// Part of the full load by which it jumps within a second, which neighbours do not tell.
+const JUMP_FRAC: f64 = 0.06;
+
 /// Fuel rate, over its noise scale (a constant part and one percent of the rate).
 pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Fuel as usize];
@@ -176,6 +180,15 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     // Between two samples their noise averages out, which is no sign of a lag.
     let between = lag - lag.floor();
     let calmed = (0.25 * (3.0 + between.powi(2) + (1.0 - between).powi(2))).sqrt();
+    // The map is read where the torque message is, with its noise; what is off is a factor on what the
+    // rows beside say, where they can.
+    let row_means = |x: &[f64]| -> Vec<f64> {
+        x.chunks_exact(4).map(|row| row.iter().sum::<f64>() * 0.25).collect()
+    };
+    let (rates, loads) = (row_means(&rate), row_means(&load));
+    let burnt_g_s =
+        |rate: f64, load: f64| rate * scale * (1.0 + low * (1.0 - load * per_load).max(0.0));
+    let reported = |burnt: f64| burnt * scale_at_rate(meter, power, burnt / most_g_s);
     valid
         .iter()
         .enumerate()
@@ -183,13 +196,13 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
             if !ok {
                 return 0.0;
             }
-            let (mut measured, mut modelled) = (0.0, 0.0);
-            for i in 4 * k..4 * k + 4 {
-                let extra = low * (1.0 - load[i] * per_load).max(0.0);
-                measured += 0.25 * d.fuel[i];
-                modelled += 0.25 * rate[i] * scale * (1.0 + extra);
-            }
-            modelled *= scale_at_rate(meter, power, modelled / most_g_s);
+            let samples = 4 * k..4 * k + 4;
+            let measured = d.fuel[samples.clone()].iter().sum::<f64>() * 0.25;
+            let told = beside(&rates, k, JUMP_FRAC * most_g_s).zip(beside(&loads, k, JUMP_FRAC));
+            let modelled = match told {
+                Some((rate, load)) => rates[k] + reported(burnt_g_s(rate, load)) - rate,
+                None => reported(samples.map(|i| 0.25 * burnt_g_s(rate[i], load[i])).sum()),
+            };
             (measured - modelled) / (d.row_unit(M::Fuel, k) * calmed)
         })
         .collect()

@@ -13,6 +13,8 @@ pub(super) enum Kind {
     BrakeHeat,
     /// How far the fan is on, 0 to 1; over start, hysteresis and band.
     Fan,
+    /// Torque of the engine brake, Nm; over its lag behind the stage.
+    EngineBrake,
     /// Force of the retarder that follows its stage, N; over what it has more.
     Retarder,
     /// Demand that a retarder of the brakes has followed, m/s²; over its saturation.

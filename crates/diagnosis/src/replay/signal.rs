@@ -1,7 +1,7 @@
 //! Signals that a free function, or the course of a cause, may follow.
 
 use crate::data::drive::Drive;
-use crate::replay::{Module, Prepared};
+use crate::replay::{Module, Prepared, beside};
 
 /// A measured signal, or its memory.
 pub(crate) struct Signal {
@@ -53,7 +53,7 @@ pub(crate) fn signal(name: &str) -> Option<usize> {
 }
 
 /// A signal over the rows of a module: its means over the samples of a row, or what it is as a shift
-/// begins.
+/// begins; what the rows beside say of the message that the module's model reads.
 pub(crate) fn means(d: &Prepared, signal: &Signal, module: Module) -> Vec<f64> {
     let remembered: Option<Vec<f64>> = (signal.memory_s > 0.0).then(|| {
         let (mut state, part) = (0.0, Drive::STEP_S / signal.memory_s);
@@ -71,10 +71,15 @@ pub(crate) fn means(d: &Prepared, signal: &Signal, module: Module) -> Vec<f64> {
         return d.shifts.iter().map(|s| at(s.0)).collect();
     }
     let step = module.row_step();
-    (0..d.n.div_ceil(step))
-        .map(|k| {
-            let (from, to) = (k * step, (k * step + step).min(d.n));
-            (from..to).map(at).sum::<f64>() / (to - from).max(1) as f64
-        })
-        .collect()
+    let mean = |k: usize| {
+        let (from, to) = (k * step, (k * step + step).min(d.n));
+        (from..to).map(at).sum::<f64>() / (to - from).max(1) as f64
+    };
+    let rows: Vec<f64> = (0..d.n.div_ceil(step)).map(mean).collect();
+    if signal.name == "engine_torque_percent" && module.reads_noise() {
+        return (0..rows.len())
+            .map(|k| beside(&rows, k, f64::INFINITY).unwrap_or(rows[k]))
+            .collect();
+    }
+    rows
 }

@@ -48,6 +48,20 @@ pub(super) fn quadratic(x: &[f64]) -> Vec<f64> {
     out
 }
 
+/// What the two rows on either side say of row `k`, exact for cubics: without the noise that the row
+/// itself has. Nothing at the ends, and where the rows beside differ by more than `jump`.
+///
+/// A model that reads a noisy message is off by that noise. What multiplies the model, or follows the
+/// message, would be fitted to damp it, were it taken from the same row: next to a pedal that tells the
+/// torque without noise, five percent of the fuel, certain by 160 nats, in drives that are in order. A
+/// neighbour's noise is its own (instrumental variables; Fuller, Measurement Error Models, 1.4).
+pub(crate) fn beside(rows: &[f64], k: usize, jump: f64) -> Option<f64> {
+    let around = [*rows.get(k.checked_sub(2)?)?, rows[k - 1], *rows.get(k + 1)?, *rows.get(k + 2)?];
+    let most = around.iter().fold(f64::NEG_INFINITY, |a, x| a.max(*x));
+    let least = around.iter().fold(f64::INFINITY, |a, x| a.min(*x));
+    (most - least <= jump).then(|| (4.0 * (around[1] + around[2]) - around[0] - around[3]) / 6.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -66,8 +80,22 @@ mod tests {
     }
 
     #[test]
+    fn a_row_by_its_neighbours_is_exact_for_cubics_and_lacks_its_own_noise() {
+        let cubic = |k: i32| f64::from(k).powi(3) - 7.0 * f64::from(k).powi(2) + 3.0;
+        let mut rows: Vec<f64> = (0..20).map(cubic).collect();
+        rows[9] += 5.0;
+        for k in [9, 12] {
+            let told = beside(&rows, k, f64::INFINITY).unwrap();
+            assert!((told - cubic(k as i32)).abs() < 1e-9);
+        }
+        assert_eq!([1, 18].map(|k| beside(&rows, k, f64::INFINITY)), [None; 2]);
+        assert_eq!(beside(&rows, 9, 1.0), None);
+    }
+
+    #[test]
     fn a_short_record_is_left_alone() {
         assert_eq!(quadratic(&[1.0, 5.0, 2.0]), [1.0, 5.0, 2.0]);
+        assert_eq!(beside(&[1.0, 5.0, 2.0], 2, f64::INFINITY), None);
         assert_eq!(running_mean(&[], CRANK), Vec::<f64>::new());
     }
 }

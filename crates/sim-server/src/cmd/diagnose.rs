@@ -27,7 +27,8 @@ use results::Results;
 /// diagnosis.json, report.html and the extended truck file.
 #[derive(Debug, Parser)]
 pub(crate) struct Args {
-    /// The truck file that the simulation uses, or a built-in name.
+    /// The truck file that the simulation uses, or a built-in name [default with --example:
+    /// reference].
     #[arg(long, value_name = "T", required_unless_present = "example")]
     truck: Option<String>,
     /// Folder of measured drives (drives.toml and one table per drive), or recordings of this
@@ -43,7 +44,7 @@ pub(crate) struct Args {
     hold_out: Vec<String>,
     /// The whole loop on a built-in example: measures a simulated truck with a hidden effect that
     /// the seed draws, diagnoses it, and runs the simulator with the extended truck.
-    #[arg(long, conflicts_with_all = ["truck", "drives", "baseline"])]
+    #[arg(long, conflicts_with_all = ["drives", "baseline"])]
     example: bool,
     /// Adds what is left without a name to the extended truck, as a table over the signal that it
     /// follows, if that helps on every drive held out.
@@ -69,22 +70,22 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     let at = out.path();
     let threads = Threads::available();
     let stages = Stages::start();
-    let hidden = if args.example {
-        stages.show("measuring a simulated truck with a hidden effect");
-        Some(example::measure(&out, args.seed, &threads)?)
-    } else {
-        None
-    };
     let folder = |given: &Option<PathBuf>, made: &str| {
         if args.example { Some(at.join(made)) } else { given.clone() }
     };
     let missing = |what: &str| Failure::Input(format!("{what} is missing"));
-    let truck_name = args.truck.as_deref().or(hidden.as_ref().map(|_| example::TRUCK));
+    let truck_name = args.truck.as_deref().or(args.example.then_some(example::TRUCK));
     let truck_name = truck_name.ok_or_else(|| missing("--truck"))?;
     let drives_at = folder(&args.drives, "drives").ok_or_else(|| missing("--drives"))?;
     let baseline_at = folder(&args.baseline, "baseline");
 
     let truck = TruckParameters::load(truck_name).map_err(Failure::input)?;
+    let hidden = if args.example {
+        stages.show("measuring a simulated truck with a hidden effect");
+        Some(example::measure(&out, &truck, args.seed, &threads)?)
+    } else {
+        None
+    };
     let drives = read(&drives_at, &truck, &out, "drives", args.seed)?;
     let baseline = baseline_at.as_deref();
     let baseline = baseline.map(|b| read(b, &truck, &out, "baseline", args.seed)).transpose()?;
@@ -108,7 +109,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
     if let Some(hidden) = hidden {
         stages.show("running the simulator with the extended truck");
         let overlay = results.outcome.extension.overlay.as_ref();
-        let closed_loop = example::close_the_loop(&hidden, overlay)?;
+        let closed_loop = example::close_the_loop(&truck, &hidden, overlay)?;
         results.example = Some((hidden, closed_loop));
     }
     stages.finish();

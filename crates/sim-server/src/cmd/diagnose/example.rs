@@ -22,7 +22,7 @@ use crate::out_folder::OutFolder;
 use crate::provenance::Provenance;
 use shell::Threads;
 
-/// Truck of the example.
+/// Truck of the example, unless another is asked for.
 pub(super) const TRUCK: &str = "reference";
 /// Causes that the highway excites.
 const CAUSES: [&str; 8] = [
@@ -66,22 +66,26 @@ pub(super) struct Hidden {
 ///
 /// # Errors
 /// [`Failure`] if a file cannot be written or a world fails.
-pub(super) fn measure(out: &OutFolder, seed: u64, threads: &Threads) -> Result<Hidden, Failure> {
+pub(super) fn measure(
+    out: &OutFolder,
+    truck: &TruckParameters,
+    seed: u64,
+    threads: &Threads,
+) -> Result<Hidden, Failure> {
     let drives_at = out.begin("drives")?;
-    let truck = TruckParameters::load(TRUCK).map_err(Failure::work)?;
-    let hidden = hide(&truck, seed)?;
+    let hidden = hide(truck, seed)?;
     let scenario = Scenario::builtin("highway-sag").map_err(Failure::work)?;
     let road = Arc::new(Road::load(&scenario.road).map_err(Failure::work)?);
     let tables = collect(threads, DRIVES + CLEAN_DRIVES, |i| {
         let clean = i >= DRIVES;
-        let of = if clean { &truck } else { &hidden.truck };
+        let of = if clean { truck } else { &hidden.truck };
         let name = if clean { format!("clean_{}", i - DRIVES) } else { format!("drive_{i}") };
         one_drive(name, &scenario, &road, of, seed, i as u64)
     });
     let mut tables: Vec<diagnosis::Table> = tables.into_iter().collect::<Result<_, _>>()?;
     let clean = tables.split_off(DRIVES);
-    folder::write(&drives_at, TRUCK, &tables)?;
-    folder::write(&out.begin("baseline")?, TRUCK, &clean)?;
+    folder::write(&drives_at, &truck.name, &tables)?;
+    folder::write(&out.begin("baseline")?, &truck.name, &clean)?;
     #[derive(Serialize)]
     struct Answer<'a> {
         #[serde(flatten)]
@@ -106,7 +110,7 @@ fn hide(truck: &TruckParameters, seed: u64) -> Result<Hidden, Failure> {
     let sign = if draw.uniform() < 0.5 && p.bounds[0] < 0.0 { -1.0 } else { 1.0 };
     let size = (sign * p.prior_sigma * (1.0 + draw.uniform())).clamp(p.bounds[0], p.bounds[1]);
     let overlay = c
-        .overlay(truck, TRUCK, &[Estimate { size, sigma: 0.0 }], "hidden by the example")
+        .overlay(truck, &truck.name, &[Estimate { size, sigma: 0.0 }], "hidden by the example")
         .map_err(Failure::work)?;
     Ok(Hidden {
         truck: truck.with_overlay(&overlay).map_err(Failure::work)?,
@@ -183,16 +187,16 @@ struct Trip {
 /// # Errors
 /// [`Failure::Work`] if a world fails.
 pub(super) fn close_the_loop(
+    truck: &TruckParameters,
     hidden: &Hidden,
     overlay: Option<&Overlay>,
 ) -> Result<ClosedLoop, Failure> {
-    let truck = TruckParameters::load(TRUCK).map_err(Failure::work)?;
     let extended = overlay.map_or_else(|| Ok(truck.clone()), |o| truck.with_overlay(o));
     let mut scenario = Scenario::builtin("highway-sag").map_err(Failure::work)?;
     scenario.traffic.source = TrafficKind::None;
     scenario.truck.payload_kg = TRIP_PAYLOAD_KG;
     let road = Arc::new(Road::load(&scenario.road).map_err(Failure::work)?);
-    let before = trip(&scenario, &road, &truck)?;
+    let before = trip(&scenario, &road, truck)?;
     let after = trip(&scenario, &road, &extended.map_err(Failure::work)?)?;
     let real = trip(&scenario, &road, &hidden.truck)?;
     let pair = |f: &dyn Fn(&Trip) -> f64| Pair { before: f(&before), after: f(&after) };
