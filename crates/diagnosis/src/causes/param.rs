@@ -156,7 +156,9 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::WarmupTau, "ln_time_constant", "1", (0.5, -1.2, 1.2, 0.2), 0.0, 0.0),
     s(P::DrivelineLoss, "extra_loss_frac", "1", (0.03, -0.05, 0.3, 0.01), 0.003, 0.0),
     s(P::FanPower, "fan_power_kw", "kW", (20.0, -5.0, 90.0, 5.0), 0.0, 0.0),
-    s(P::FanStart, "coolant_start_offset_k", "K", (5.0, -14.0, 14.0, 1.5), 0.0, 0.0),
+    // A fan holds the coolant where it begins, within what the message resolves: how far it is on there
+    // is not told.
+    s(P::FanStart, "coolant_start_offset_k", "K", (5.0, -14.0, 14.0, 1.5), 0.3, 0.0),
     s(P::DragBrake, "force_n", "N", (600.0, -200.0, 6000.0, 100.0), 30.0, 0.0),
     s(P::Friction, "friction_scale", "1", (0.25, -0.7, 1.5, 0.1), 0.015, 0.0),
     s(P::Altitude, "torque_loss_per_km", "1/km", (0.08, -0.02, 0.5, 0.03), 0.0, 0.0),
@@ -295,6 +297,28 @@ impl P {
         matches!(self, Self::RetarderFrom | Self::RetarderSteep | Self::FanStart | Self::FadeStart)
     }
 
+    /// Air, loads, tyres, steering: enters as a product, without a kink, so that a step to its second order
+    /// is better than none.
+    pub(crate) fn is_smooth(self) -> bool {
+        matches!(
+            self,
+            Self::Headwind
+                | Self::WindX
+                | Self::WindY
+                | Self::Crosswind
+                | Self::Drag
+                | Self::Rolling
+                | Self::Mass
+                | Self::PayloadX
+                | Self::Bank
+                | Self::CFront
+                | Self::CDrive
+                | Self::CTrailer
+                | Self::SteerRatio
+                | Self::SteerOffset
+        )
+    }
+
     /// A shape that is one of a few in truth.
     pub(crate) fn is_switch(self) -> bool {
         matches!(self, P::StiffnessFollows | P::StiffnessFollowsMass | P::FuelLowOver)
@@ -311,6 +335,8 @@ mod tests {
             assert_eq!(spec.p as usize, i, "{}", spec.key);
             assert!(spec.lo <= 0.0, "{}", spec.key);
             assert!(spec.step > 0.0 && spec.hi > spec.step);
+            // What tolerances do beyond their columns is asked of those that have one.
+            assert!(!spec.p.is_smooth() || spec.scatter() > 0.0, "{}", spec.key);
         }
     }
 }

@@ -23,7 +23,6 @@ mod white;
 pub(crate) use gram::Gram;
 pub(crate) use moved::moves;
 pub(crate) use nuisance::Rest;
-pub(crate) use second_order::is_smooth;
 
 use means::means_apart;
 #[cfg(test)]

@@ -21,35 +21,12 @@ use std::sync::Arc;
 
 use super::signals::{Line, Signals};
 use super::{Direction, Gram, Problem, nuisance_directions};
-use crate::causes::param::{P, Theta};
+use crate::causes::param::Theta;
 use crate::replay::{GROUPS, Group, affects};
-
-/// Tolerances without kinks that enter as products: air, loads, tyres, steering.
-const SMOOTH: [P; 14] = [
-    P::Headwind,
-    P::WindX,
-    P::WindY,
-    P::Crosswind,
-    P::Drag,
-    P::Rolling,
-    P::Mass,
-    P::PayloadX,
-    P::Bank,
-    P::CFront,
-    P::CDrive,
-    P::CTrailer,
-    P::SteerRatio,
-    P::SteerOffset,
-];
 
 /// Deviations that a drive's tolerances have at the most. Where the drive says more, its cause is not in
 /// the model yet, and what tolerances of ten deviations would do says nothing of the day.
 const MOST_DEVIATIONS: f64 = 3.0;
-
-/// Whether a parameter is one of those whose second order is known.
-pub(crate) fn is_smooth(p: P) -> bool {
-    SMOOTH.contains(&p)
-}
 
 impl Problem<'_> {
     /// The Gram matrix of the residual at `theta` with what the tolerances do there beyond their first
@@ -68,7 +45,7 @@ impl Problem<'_> {
         let nuisance = &self.nuisance[i];
         let directions = nuisance_directions(&self.reference.tolerance);
         let smooth: Vec<usize> =
-            (0..directions.len()).filter(|j| is_smooth(directions[*j].p)).collect();
+            (0..directions.len()).filter(|j| directions[*j].p.is_smooth()).collect();
         let line = self.at(i, theta);
         let z = self.most_probable(i, &line, theta);
         let most = smooth.iter().map(|j| z[*j].abs()).fold(MOST_DEVIATIONS, f64::max);
@@ -98,6 +75,7 @@ mod tests {
     use dynamics::TruckParameters;
 
     use super::*;
+    use crate::causes::param::P;
     use crate::problem::nuisance::Changed;
     use crate::replay::Prepared;
     use crate::replay::tests::recorded;

@@ -8,7 +8,7 @@
 
 use crate::causes::hypothesis::{CATALOGUE, Hypothesis};
 use crate::causes::param::{PARAMS, Spec, Theta};
-use crate::problem::{Gram, is_smooth};
+use crate::problem::Gram;
 use crate::replay::affects;
 use crate::search::decisions::{AHEAD, MIN_EVIDENCE, PRIOR_CAUSE, RANKED};
 use crate::search::evidence::Evidence;
@@ -270,7 +270,7 @@ impl dyn Evidence + '_ {
             let left = |gram: Gram| gram.total().2;
             (left(self.gram(theta, &[])) - left(self.gram_as_driven(theta, &[]))).max(0.0)
         };
-        let could_be = |h: usize| CATALOGUE[h].sizes.iter().any(|p| is_smooth(*p));
+        let could_be = |h: usize| CATALOGUE[h].sizes.iter().any(|p| p.is_smooth());
         let beside = if fit.set.iter().any(|h| could_be(*h)) { falls(&fit.theta) } else { 0.0 };
         let taken = |f: &Option<Fit>| {
             let theta = f.as_ref().map_or(self.zero(), |f| &f.theta);

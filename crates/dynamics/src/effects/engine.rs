@@ -23,6 +23,9 @@ use crate::bounds::Bounds;
 use crate::effects::cooling::in_band;
 use crate::effects::fuel::{FuelMap, FuelParameters, Range};
 
+/// Width of the governor at the highest speed, over that speed: half of it on either side.
+const GOVERNOR_FRAC: f64 = 0.04;
+
 /// The engine block of a truck file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -313,12 +316,19 @@ impl Engine {
         }
     }
 
+    /// Speed beyond which nothing is injected, rad/s.
+    #[inline]
+    #[must_use]
+    pub fn most_rad_s(&self) -> f64 {
+        (1.0 + 0.5 * GOVERNOR_FRAC) * self.max_rad_s
+    }
+
     /// The demand within what the engine can give, under the governor at its highest speed, Nm.
     #[inline]
     #[must_use]
     pub fn governed_nm(&self, demand_nm: f64, speed_rad_s: f64, full_load_nm: f64) -> f64 {
-        let max = self.max_rad_s;
-        let governor = ((max * 1.02 - speed_rad_s) / (max * 0.04)).clamp(0.0, 1.0);
+        let band = GOVERNOR_FRAC * self.max_rad_s;
+        let governor = ((self.most_rad_s() - speed_rad_s) / band).clamp(0.0, 1.0);
         demand_nm.min(full_load_nm + self.friction_nm(speed_rad_s)) * governor
     }
 

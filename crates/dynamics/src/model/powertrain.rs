@@ -188,7 +188,8 @@ impl TruckModel {
         let lag = e.lag_s(s.engine_torque_nm, target, full_load_nm);
         let step = (target - s.engine_torque_nm) * (SUBSTEP_S / lag).min(1.0);
         s.engine_torque_nm = (s.engine_torque_nm + step.clamp(-fall, rise)).max(0.0);
-        if s.shift.phase == ShiftPhase::Open {
+        // Beyond its highest speed an engine is not injected, whatever its torque lags behind.
+        if s.shift.phase == ShiftPhase::Open || n > e.most_rad_s() {
             s.engine_torque_nm = 0.0;
         }
         let braking = if s.clutch_locked && pedal < 0.01 { retarder } else { 0.0 };

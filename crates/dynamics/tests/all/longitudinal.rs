@@ -403,3 +403,20 @@ fn a_hidden_retarder_acts_only_while_the_accelerator_is_released_and_from_its_sp
     assert_eq!(force_n(20.0, &pedal(0.5)), 0.0);
     assert_eq!(force_n(6.0, &pedal(0.0)), 0.0);
 }
+
+/// An engine without inertia, whose torque may only fall slowly, was pulled to a stall at full pedal in
+/// top gear; as the clutch opened it turned at 24,600 rpm and burnt 288 g/s.
+#[test]
+fn an_engine_that_comes_free_at_full_load_is_not_injected_beyond_its_highest_speed() {
+    let m = TruckModel::new(TruckParameters::load("iits").unwrap(), 30_000.0).unwrap();
+    let most = 1.3 * m.parameters().engine.max_speed_rpm / tractrix_core::RPM_PER_RAD_S;
+    let (uphill, command) = (on_grade(0.03), pedal(1.0));
+    let (mut s, mut comes_free) = (m.initial_state(0.0, 0.0, 0.0, 12.0), false);
+    for _ in 0..6_000 {
+        let was_locked = s.clutch_locked;
+        s = run(&m, &s, &Command { gear: GearRequest::Gear(12), ..command }, &uphill, 0.01);
+        comes_free |= was_locked && !s.clutch_locked;
+        assert!(s.engine_speed_rad_s < most, "{} rad/s", s.engine_speed_rad_s);
+    }
+    assert!(comes_free, "{} m/s", s.speed_m_s);
+}
