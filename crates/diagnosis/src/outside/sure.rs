@@ -3,6 +3,7 @@
 
 use crate::Unknown;
 use crate::causes::hypothesis::CATALOGUE;
+use crate::causes::param::{P, Theta};
 use crate::causes::sentence;
 use crate::outside::catch_all::Left;
 use crate::outside::unknown::{Acts, Restless, Shape};
@@ -13,6 +14,7 @@ use crate::search::decisions::{
     AHEAD, CATCH_ALL, CATCH_ALL_PART, CROWD, FREE_FORM_TIMES, REPLACED_MANY, UNKNOWN_EVIDENCE,
 };
 use crate::search::refit::Fit;
+use crate::studies::identify::SIGMAS_90;
 
 /// Modules whose replay reads what another one measures: speed is read by all, torque and pressure by
 /// the force balance, torque by the fuel, the yaw rate by heading and trailer.
@@ -190,14 +192,26 @@ fn sharing(fit: &Fit, module: Module) -> usize {
 }
 
 /// Signs that the named causes stand in for one that the catalogue lacks: three of them share a
-/// module, or a size or a form has run to its bound.
+/// module, a size or a form has run to its bound, or the meters of fuel and of what it burns to err
+/// alike.
 fn stands_in(problem: &Problem<'_>, fit: &Fit) -> bool {
     let crowded = Module::ALL.into_iter().any(|m| sharing(fit, m) >= CROWD);
     let zero = &problem.reference.theta;
     let ends = |h: &usize| {
         CATALOGUE[*h].is_at_bound(&fit.theta, zero) || CATALOGUE[*h].strays(&fit.theta, zero)
     };
-    crowded || fit.set.iter().any(ends)
+    crowded || fit.set.iter().any(ends) || meters_err_alike(fit, zero)
+}
+
+/// The meters of fuel and CO2 err by the same: they agree, and what is off is the fuel that is burnt, of
+/// which the catalogue has low loads alone.
+fn meters_err_alike(fit: &Fit, zero: &Theta) -> bool {
+    let at = |p: P| fit.free.iter().position(|q| *q == p);
+    let (Some(i), Some(j)) = (at(P::FuelFlow), at(P::Co2Scale)) else { return false };
+    let [fuel, co2] = [P::FuelFlow, P::Co2Scale].map(|p| p.of_truck(&fit.theta, zero));
+    // Their intervals overlap: what both have in common is known better than either.
+    let variance = fit.covariance[(i, i)] + fit.covariance[(j, j)];
+    fuel * co2 > 0.0 && (fuel - co2).powi(2) < (SIGMAS_90 * SIGMAS_90) * variance
 }
 
 /// What the best of some free functions says, with the signals that say nearly as much.

@@ -11,7 +11,7 @@ use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
 use super::rise::Rise;
-use super::smooth::beside;
+use super::smooth::{JUMP_FRAC, beside};
 use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -142,9 +142,6 @@ pub(super) fn shift(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
 pub(crate) const LOW_LOAD_FRAC: f64 = 0.3;
 /// Engine speed at which a load is a power, rpm: where highway trucks cruise.
 pub(crate) const CRUISE_RPM: f64 = 1_250.0;
-
-/// Part of the full load by which it jumps within a second, which neighbours do not tell.
-const JUMP_FRAC: f64 = 0.06;
 
 /// Fuel rate, over its noise scale (a constant part and one percent of the rate).
 pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {

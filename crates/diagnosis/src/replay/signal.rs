@@ -1,7 +1,7 @@
 //! Signals that a free function, or the course of a cause, may follow.
 
 use crate::data::drive::Drive;
-use crate::replay::{Module, Prepared, beside};
+use crate::replay::{JUMP_FRAC, Module, Prepared, beside};
 
 /// A measured signal, or its memory.
 pub(crate) struct Signal {
@@ -78,7 +78,7 @@ pub(crate) fn means(d: &Prepared, signal: &Signal, module: Module) -> Vec<f64> {
     let rows: Vec<f64> = (0..d.n.div_ceil(step)).map(mean).collect();
     if signal.name == "engine_torque_percent" && module.reads_noise() {
         return (0..rows.len())
-            .map(|k| beside(&rows, k, f64::INFINITY).unwrap_or(rows[k]))
+            .map(|k| beside(&rows, k, 100.0 * JUMP_FRAC).unwrap_or(rows[k]))
             .collect();
     }
     rows

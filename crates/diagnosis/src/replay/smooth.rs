@@ -48,6 +48,9 @@ pub(super) fn quadratic(x: &[f64]) -> Vec<f64> {
     out
 }
 
+/// Part of what there is of a signal by which it jumps within a second, which neighbours do not tell.
+pub(crate) const JUMP_FRAC: f64 = 0.06;
+
 /// What the two rows on either side say of row `k`, exact for cubics: without the noise that the row
 /// itself has. Nothing at the ends, and where the rows beside differ by more than `jump`.
 ///
