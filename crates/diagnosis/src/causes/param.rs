@@ -156,9 +156,7 @@ pub(crate) const SPECS: [Spec; PARAMS] = [
     s(P::WarmupTau, "ln_time_constant", "1", (0.5, -1.2, 1.2, 0.2), 0.0, 0.0),
     s(P::DrivelineLoss, "extra_loss_frac", "1", (0.03, -0.05, 0.3, 0.01), 0.003, 0.0),
     s(P::FanPower, "fan_power_kw", "kW", (20.0, -5.0, 90.0, 5.0), 0.0, 0.0),
-    // A fan holds the coolant where it begins, within the kelvin that message and sensor resolve: how far
-    // it is on there is not told.
-    s(P::FanStart, "coolant_start_offset_k", "K", (5.0, -14.0, 14.0, 1.5), 1.0, 0.0),
+    s(P::FanStart, "coolant_start_offset_k", "K", (5.0, -14.0, 14.0, 1.5), 0.0, 0.0),
     s(P::DragBrake, "force_n", "N", (600.0, -200.0, 6000.0, 100.0), 30.0, 0.0),
     s(P::Friction, "friction_scale", "1", (0.25, -0.7, 1.5, 0.1), 0.015, 0.0),
     s(P::Altitude, "torque_loss_per_km", "1/km", (0.08, -0.02, 0.5, 0.03), 0.0, 0.0),
