@@ -183,6 +183,8 @@ fn python_home(python: &Path) -> Option<PathBuf> {
 pub struct Process {
     child: Child,
     stderr: Arc<Mutex<VecDeque<u8>>>,
+    /// Reads the error output until that ends.
+    reader: Option<std::thread::JoinHandle<()>>,
 }
 
 impl Process {
@@ -203,7 +205,7 @@ impl Process {
                 stderr: format!("{}: {e}", programs.sumo.display()),
             })?;
         let stderr = Arc::new(Mutex::new(VecDeque::new()));
-        if let Some(mut pipe) = child.stderr.take() {
+        let reader = child.stderr.take().map(|mut pipe| {
             let ring = Arc::clone(&stderr);
             std::thread::spawn(move || {
                 let mut chunk = [0u8; 4096];
@@ -214,9 +216,9 @@ impl Process {
                     let over = ring.len().saturating_sub(STDERR_BYTES);
                     ring.drain(..over);
                 }
-            });
-        }
-        Ok(Self { child, stderr })
+            })
+        });
+        Ok(Self { child, stderr, reader })
     }
 
     /// Process id, for those who watch it.
@@ -230,20 +232,27 @@ impl Process {
         matches!(self.child.try_wait(), Ok(None))
     }
 
-    /// How it ended, in words; waits up to a fifth of a second for a process that is just ending.
+    /// How it ended, in words; waits up to a fifth of a second for a process that is just ending, and for
+    /// what it has printed to be read: on a busy machine its last words were still in the pipe.
     #[expect(
         clippy::disallowed_methods,
         reason = "gives an ending process time to leave its status"
     )]
     pub fn ending(&mut self) -> String {
+        let mut ended = None;
         for _ in 0..100 {
             match self.child.try_wait() {
-                Ok(Some(status)) => return status.to_string(),
-                Ok(None) => std::thread::sleep(std::time::Duration::from_millis(2)),
+                Ok(Some(status)) => ended = Some(status.to_string()),
+                Ok(None) => {}
                 Err(e) => return e.to_string(),
             }
+            let read = self.reader.as_ref().is_none_or(std::thread::JoinHandle::is_finished);
+            match ended.take_if(|_| read) {
+                Some(ended) => return ended,
+                None => std::thread::sleep(std::time::Duration::from_millis(2)),
+            }
         }
-        "still running".to_owned()
+        ended.unwrap_or_else(|| "still running".to_owned())
     }
 
     /// The last lines of its error output.
