@@ -9,7 +9,7 @@ use crate::problem::course::Point;
 use crate::problem::stats::evidence;
 use crate::problem::{Problem, Rest};
 use crate::replay::signal::{SIGNALS, Signal, means};
-use crate::replay::{JUMP_FRAC, Module, Prepared, beside};
+use crate::replay::{JUMP_FRAC, Module, Prepared, by_neighbours};
 use crate::search::decisions::{RESTLESS, RESTLESS_ALONE, RHO, SCATTER_PRIOR};
 
 /// Knots of the spline.
@@ -104,7 +104,7 @@ fn own_size(d: &Prepared, module: Module, residual: &[f64]) -> Vec<f64> {
         return own;
     }
     let jump = JUMP_FRAC * own.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-    (0..own.len()).map(|k| beside(&own, k, jump).unwrap_or(own[k])).collect()
+    by_neighbours(&own, jump)
 }
 
 /// How much more the drives disagree about a free function than their noise says, at least 1: the

@@ -28,7 +28,7 @@ mod smooth;
 pub(crate) use powertrain::{CRUISE_RPM, LOW_LOAD_FRAC};
 pub(crate) use prepared::Prepared;
 pub(crate) use retarder::{RETARDER_LAG_S, RETARDER_POWER_W};
-pub(crate) use smooth::{JUMP_FRAC, beside};
+pub(crate) use smooth::{JUMP_FRAC, by_neighbours};
 
 use crate::Plant;
 use crate::causes::param::{P, PARAMS, Theta};

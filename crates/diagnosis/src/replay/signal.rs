@@ -1,7 +1,7 @@
 //! Signals that a free function, or the course of a cause, may follow.
 
 use crate::data::drive::Drive;
-use crate::replay::{JUMP_FRAC, Module, Prepared, beside};
+use crate::replay::{JUMP_FRAC, Module, Prepared, by_neighbours};
 
 /// A measured signal, or its memory.
 pub(crate) struct Signal {
@@ -77,9 +77,7 @@ pub(crate) fn means(d: &Prepared, signal: &Signal, module: Module) -> Vec<f64> {
     };
     let rows: Vec<f64> = (0..d.n.div_ceil(step)).map(mean).collect();
     if signal.name == "engine_torque_percent" && module.reads_noise() {
-        return (0..rows.len())
-            .map(|k| beside(&rows, k, 100.0 * JUMP_FRAC).unwrap_or(rows[k]))
-            .collect();
+        return by_neighbours(&rows, 100.0 * JUMP_FRAC);
     }
     rows
 }

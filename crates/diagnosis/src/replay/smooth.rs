@@ -58,11 +58,17 @@ pub(crate) const JUMP_FRAC: f64 = 0.06;
 /// message, would be fitted to damp it, were it taken from the same row: next to a pedal that tells the
 /// torque without noise, five percent of the fuel, certain by 160 nats, in drives that are in order. A
 /// neighbour's noise is its own (instrumental variables; Fuller, Measurement Error Models, 1.4).
-pub(crate) fn beside(rows: &[f64], k: usize, jump: f64) -> Option<f64> {
+pub(super) fn beside(rows: &[f64], k: usize, jump: f64) -> Option<f64> {
     let around = [*rows.get(k.checked_sub(2)?)?, rows[k - 1], *rows.get(k + 1)?, *rows.get(k + 2)?];
     let most = around.iter().fold(f64::NEG_INFINITY, |a, x| a.max(*x));
     let least = around.iter().fold(f64::INFINITY, |a, x| a.min(*x));
     (most - least <= jump).then(|| (4.0 * (around[1] + around[2]) - around[0] - around[3]) / 6.0)
+}
+
+/// All rows by those beside, where these tell them.
+pub(crate) fn by_neighbours(rows: &[f64], jump: f64) -> Vec<f64> {
+    let told = |(k, own): (usize, &f64)| beside(rows, k, jump).unwrap_or(*own);
+    rows.iter().enumerate().map(told).collect()
 }
 
 #[cfg(test)]
@@ -93,6 +99,7 @@ mod tests {
         }
         assert_eq!([1, 18].map(|k| beside(&rows, k, f64::INFINITY)), [None; 2]);
         assert_eq!(beside(&rows, 9, 1.0), None);
+        assert_eq!(by_neighbours(&rows, 1.0)[9], rows[9]);
     }
 
     #[test]

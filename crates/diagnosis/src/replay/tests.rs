@@ -262,6 +262,21 @@ fn a_retarder_of_the_brakes_fills_within_a_second_and_has_a_limit() {
     assert!((held_m_s(2.0, 0.0).1 / held_m_s(1.0, 0.0).1 - 2.0).abs() < 1e-3);
 }
 
+/// A demanded stage was taken to act at once: an engine brake that comes 0.2 s later was one of -33 %
+/// beside a hidden retarder, both certain, in trucks that brake with part of it.
+#[test]
+fn an_engine_brake_acts_later_than_its_stage_is_logged() {
+    let begins = [(C::EngineBrakeFrac, 0.0, 1.0)];
+    let half = held_back(&[(P::EngineBrakeScale, -0.5)], 10 * 20, &begins);
+    for (lag_s, row) in [(0.4, 10), (-0.4, 9)] {
+        let held = held_back(&[(P::StageLag, lag_s)], 10 * 20, &begins);
+        assert!(held[..9].iter().chain(&held[11..]).all(|x| *x < 1e-12), "{held:?}");
+        assert!(held[row] > 0.7 * (held[9] + held[10]), "{held:?}");
+        let lacks_s = 0.5 * (held[9] + held[10]) / half[30];
+        assert!((lacks_s - lag_s.abs()).abs() < 0.03, "{lacks_s} s of {lag_s} s");
+    }
+}
+
 /// A retarder that holds a truck on descents, and not where it rolls out on the level, had no name.
 #[test]
 fn a_retarder_of_descents_holds_there_and_with_a_released_pedal_alone() {

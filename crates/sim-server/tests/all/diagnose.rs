@@ -93,6 +93,19 @@ fn our_own_recordings_of_the_same_truck_leave_nothing_to_explain() {
     assert!(folder.path().join("out/report.html").is_file());
 }
 
+/// The example takes a truck; one that does not exist is named, and nothing is left.
+#[test]
+fn the_example_of_a_truck_that_does_not_exist_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = text(&folder.path().join("out"));
+    let args = ["diagnose", "--example", "--truck", "no-such-truck", "--out", &out];
+    let output = support::server(&args);
+    assert_eq!(output.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("no-such-truck"), "{said}");
+    assert!(!folder.path().join("out").exists(), "{said}");
+}
+
 /// The whole loop: what was hidden is named, the extended truck loads and drives, the gain on the
 /// drives held out is significant.
 #[test]
