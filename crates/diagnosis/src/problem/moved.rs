@@ -1,10 +1,12 @@
-//! The tolerance of the map's place, where a fit has moved the map.
+//! Tolerances of where a noisy record is read, where a fit has moved that.
 //!
 //! A map errs by itself, by `n` at a place. Its tolerance has the column `g' + n'`, and what is left
 //! of a map that is moved by `theta` has `n(theta)`. Taken from where nothing is moved the two go
 //! together at every `theta` but none, the tolerance takes part of the map's own error at any shift,
 //! and shifts come out a third too large. Taken where the map is, `n` and `n'` have nothing to do with
-//! each other: the column is worked out anew with the directions of a fit.
+//! each other: the column is worked out anew with the directions of a fit. So it is with the time at
+//! which the torque message is read for its fuel: without, the lag of a fuel rate that comes with its
+//! torque was learned as -0.08 s.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
@@ -18,25 +20,28 @@ use crate::causes::param::{P, Theta};
 /// Shifts of which a drive keeps the column: those of the steps of one fit.
 const KEPT: usize = 4;
 
-/// Whether the sensitivity to a tolerance has to be taken where the fit is.
+/// Where the map is read, and when the torque message.
+const READ: [P; 2] = [P::MapShift, P::FuelLag];
+
+/// Whether the sensitivity to a tolerance has to be taken where the fit is, and to both sides: an error
+/// that a secant shares with its foot pulls to one side.
 pub(crate) fn moves(p: P) -> bool {
-    p == P::MapShift
+    READ.contains(&p)
 }
 
-/// The column of the map's place at another shift than the calibration's.
+/// The columns of what is read elsewhere than in the calibration.
 pub(super) struct Moved {
-    /// Its number among the tolerances.
-    at: usize,
-    column: Line,
+    /// With their numbers among the tolerances.
+    columns: Vec<(usize, Line)>,
     /// Cholesky factor of `I + Z'Z`.
     pub(super) factor: Cholesky<f64, Dyn>,
     /// Information of the drive about the means of the tolerances.
     pub(super) information: DMatrix<f64>,
 }
 
-/// Columns of one drive by the shift.
+/// Columns of one drive by what is read where.
 #[derive(Default)]
-pub(super) struct Shifts(Mutex<HashMap<u64, Arc<Moved>>>);
+pub(super) struct Shifts(Mutex<HashMap<[u64; READ.len()], Arc<Moved>>>);
 
 impl Shifts {
     /// Forgets all: noise or tolerances have changed.
@@ -48,46 +53,57 @@ impl Shifts {
 }
 
 impl Problem<'_> {
-    /// The column of drive `i` at the shift of `theta`; `None` where it is the calibration's.
+    /// The columns of drive `i` where `theta` reads; `None` where that is as in the calibration.
     pub(super) fn moved(&self, i: usize, theta: &Theta) -> Option<Arc<Moved>> {
-        let (p, reference) = (P::MapShift, &self.reference);
-        let shift = theta[p as usize];
-        if shift == reference.theta[p as usize] || reference.tolerance[p as usize] <= 0.0 {
+        let reference = &self.reference;
+        let elsewhere: Vec<P> = READ
+            .into_iter()
+            .filter(|p| theta[*p as usize] != reference.theta[*p as usize])
+            .filter(|p| reference.tolerance[*p as usize] > 0.0)
+            .collect();
+        if elsewhere.is_empty() {
             return None;
         }
-        if let Some(kept) = self.shifts[i].0.lock().ok()?.get(&shift.to_bits()) {
+        let key = READ.map(|p| theta[p as usize].to_bits());
+        if let Some(kept) = self.shifts[i].0.lock().ok()?.get(&key) {
             return Some(kept.clone());
         }
-        let at = nuisance_directions(&reference.tolerance).iter().position(|d| d.p == p)?;
         let mut there = reference.theta;
-        there[p as usize] = shift;
-        let column = self.line(i, &there, &Direction::new(p, Vec::new(), p.spec().step));
+        READ.iter().for_each(|p| there[*p as usize] = theta[*p as usize]);
+        let directions = nuisance_directions(&reference.tolerance);
+        let columns = elsewhere.into_iter().map(|p| {
+            let at = directions.iter().position(|d| d.p == p)?;
+            Some((at, self.line(i, &there, &Direction::new(p, Vec::new(), p.spec().step))))
+        });
+        let columns: Vec<(usize, Line)> = columns.collect::<Option<_>>()?;
         let nuisance = &self.nuisance[i];
         let mut scaled = nuisance.scaled();
-        let products = self.products(i, &column);
-        for (j, product) in products.iter().enumerate() {
-            let both = nuisance.sigma[at] * nuisance.sigma[j] * product;
-            (scaled[(at, j)], scaled[(j, at)]) = (both, both);
+        for (at, column) in &columns {
+            let mut products = self.products(i, column);
+            columns.iter().for_each(|(j, other)| products[*j] = self.dot(i, other, column));
+            for (j, product) in products.iter().enumerate() {
+                let both = nuisance.sigma[*at] * nuisance.sigma[j] * product;
+                (scaled[(*at, j)], scaled[(j, *at)]) = (both, both);
+            }
         }
-        scaled[(at, at)] = nuisance.sigma[at].powi(2) * self.dot(i, &column, &column);
         let q = scaled.nrows();
         let factor = (scaled + DMatrix::identity(q, q)).cholesky()?;
         let information = self.information(&factor);
-        let moved = Arc::new(Moved { at, column, factor, information });
+        let moved = Arc::new(Moved { columns, factor, information });
         let mut kept = self.shifts[i].0.lock().ok()?;
         if kept.len() >= KEPT {
             kept.clear();
         }
-        kept.insert(shift.to_bits(), moved.clone());
+        kept.insert(key, moved.clone());
         Some(moved)
     }
 
-    /// Products of a line with the tolerances of drive `i` in their standard deviations, that of the
-    /// map's place where it is.
+    /// Products of a line with the tolerances of drive `i` in their standard deviations, those of where
+    /// it reads taken there.
     pub(super) fn against_at(&self, i: usize, line: &Line, moved: Option<&Moved>) -> DVector<f64> {
         let mut out = self.against(i, line);
-        if let Some(m) = moved {
-            out[m.at] = self.nuisance[i].sigma[m.at] * self.dot(i, &m.column, line);
+        for (at, column) in moved.iter().flat_map(|m| &m.columns) {
+            out[*at] = self.nuisance[i].sigma[*at] * self.dot(i, column, line);
         }
         out
     }

@@ -221,7 +221,6 @@ impl Problem<'_> {
             t[direction.p as usize] += direction.step;
             let mut moved = self.replay_one(i, group, &t);
             let (base, step) = if moves(direction.p) {
-                // To both sides: an error that a secant shares with its foot pulls to one side.
                 t[direction.p as usize] -= 2.0 * direction.step;
                 (Arc::new(self.replay_one(i, group, &t)), 2.0 * direction.step)
             } else {

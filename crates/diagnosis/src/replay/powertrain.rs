@@ -11,7 +11,7 @@ use super::Module as M;
 use super::prepared::{Prepared, at_index};
 use super::profiles::Kind;
 use super::rise::Rise;
-use super::smooth::{JUMP_FRAC, beside};
+use super::smooth::{JUMP_FRAC, beside, calm_at};
 use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
@@ -148,12 +148,12 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let valid = &d.valid[M::Fuel as usize];
     let lag = t[P::FuelLag as usize] / Drive::STEP_S;
     let torque = |i: usize| {
-        let percent = at_index(&d.torque, i as f64 - lag);
+        let percent = calm_at(&d.torque, i as f64 - lag);
         // Rows without fuel are masked: what is injected elsewhere burns along the map's line, even
         // where the message says no torque.
         (percent * 0.01 * plant.truck.engine.reference_torque_nm).max(1e-9)
     };
-    let omega = |i: usize| at_index(&d.rpm, i as f64 - lag) / RPM_PER_RAD_S;
+    let omega = |i: usize| calm_at(&d.rpm, i as f64 - lag) / RPM_PER_RAD_S;
     let rate = d.profiles.get(Kind::Willans, [lag], || {
         (0..d.n).map(|i| plant.engine.fuel_rate_g_s(omega(i), torque(i))).collect()
     });
@@ -174,9 +174,6 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
     let (meter, power) = (t[P::FuelFlow as usize], t[P::FuelFlowPower as usize]);
     let most_g_s = plant.engine.most_fuel_g_s;
     let per_load = 1.0 / (LOW_LOAD_FRAC * t[P::FuelLowLoad as usize].exp());
-    // Between two samples their noise averages out, which is no sign of a lag.
-    let between = lag - lag.floor();
-    let calmed = (0.25 * (3.0 + between.powi(2) + (1.0 - between).powi(2))).sqrt();
     // The map is read where the torque message is, with its noise; what is off is a factor on what the
     // rows beside say, where they can.
     let row_means = |x: &[f64]| -> Vec<f64> {
@@ -200,7 +197,7 @@ pub(super) fn fuel(d: &Prepared, plant: &Plant, t: &Theta) -> Vec<f64> {
                 Some((rate, load)) => rates[k] + reported(burnt_g_s(rate, load)) - rate,
                 None => reported(samples.map(|i| 0.25 * burnt_g_s(rate[i], load[i])).sum()),
             };
-            (measured - modelled) / (d.row_unit(M::Fuel, k) * calmed)
+            (measured - modelled) / d.row_unit(M::Fuel, k)
         })
         .collect()
 }

@@ -88,3 +88,16 @@ pub(super) fn windows(r: &Rates, coarse: i64) -> Vec<WindowLag> {
         })
         .collect()
 }
+
+/// Samples of the windows in which the channels move together. At a steady speed there is nothing but
+/// noise, and a drift was fitted to it: half a second over drives with one hill.
+pub(super) fn together(r: &Rates, windows: &[WindowLag]) -> Vec<bool> {
+    let mut out = vec![false; r.x.len().min(r.y.len())];
+    let half = 0.5 * WINDOW_S;
+    for w in windows {
+        let sample = |t: f64| (t.max(0.0) / Rates::STEP_S) as usize;
+        let range = sample(w.time_s - half)..sample(w.time_s + half).min(out.len());
+        out[range].fill(true);
+    }
+    out
+}

@@ -85,45 +85,71 @@ pub(super) fn squared_residuals(
 }
 
 /// Covariance that holds although y is noisy too: the bend of the residual takes the noise of y's
-/// slope out of the information (its mean is minus the noise's part), and the scores are summed
-/// over blocks, which may be correlated inside (White, Econometrica 50(1), 1982).
+/// slope out of the information (its mean is minus the noise's part). From the scores of blocks, which
+/// may be correlated inside, each by what leaving it out would move (the jackknife of clusters: Bell and
+/// McCaffrey, Survey Methodology 28(2), 2002): one block that says nearly all says it alone.
 fn sandwich(
-    mut hessian: Matrix4<f64>,
-    bend: [f64; 3],
     white: &[Vec<f64>; 4],
+    bends: &[Vec<f64>; 3],
     e: &[f64],
     drifts: bool,
 ) -> Option<Matrix4<f64>> {
-    hessian[(0, 0)] -= bend[0];
-    if drifts {
-        hessian[(0, 1)] -= bend[1];
-        hessian[(1, 0)] -= bend[1];
-        hessian[(1, 1)] -= bend[2];
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let blocks: Vec<(Matrix4<f64>, Vector4<f64>)> = (0..e.len())
+        .step_by(BLOCK)
+        .map(|from| {
+            let block = from..(from + BLOCK).min(e.len());
+            let part = |k: usize| &white[k][block.clone()];
+            let mut hessian = Matrix4::from_fn(|i, j| dot(part(i), part(j)));
+            let bend = |k: usize| dot(&bends[k][block.clone()], &e[block.clone()]);
+            hessian[(0, 0)] -= bend(0);
+            if drifts {
+                hessian[(0, 1)] -= bend(1);
+                hessian[(1, 0)] -= bend(1);
+                hessian[(1, 1)] -= bend(2);
+            }
+            (hessian, Vector4::from_fn(|k, _| dot(part(k), &e[block.clone()])))
+        })
+        .collect();
+    let mut hessian: Matrix4<f64> = blocks.iter().map(|b| b.0).sum();
+    if !drifts {
+        hessian[(1, 1)] = 1.0;
     }
-    // Far from the peak the bend may exceed the information.
-    let inverse = hessian.cholesky()?.inverse();
-    let mut scores = Matrix4::zeros();
-    for from in (0..e.len()).step_by(BLOCK) {
-        let block = from..(from + BLOCK).min(e.len());
-        let score = Vector4::from_fn(|k, _| block.clone().map(|i| white[k][i] * e[i]).sum::<f64>());
-        scores += score * score.transpose();
+    let mut out = Matrix4::zeros();
+    for (own, score) in &blocks {
+        // Far from the peak the bend may exceed the information.
+        let moved = (hessian - own).cholesky()?.solve(score);
+        out += moved * moved.transpose();
     }
-    Some(inverse * scores * inverse)
+    Some(out)
 }
 
 impl Fit {
     /// Lag of a window, without drift.
     pub(super) fn window(r: &Rates, range: Range<usize>, start_s: f64) -> Option<Self> {
-        Self::new(r, range, (start_s, 0.0), false)
+        Self::new(r, range, (start_s, 0.0), None)
     }
 
-    /// Lag and drift of a stretch, from a line (lag in its middle s, drift s/s).
-    pub(super) fn stretch(r: &Rates, range: Range<usize>, line: (f64, f64)) -> Option<Self> {
-        Self::new(r, range, line, true)
+    /// Lag and drift of a stretch, from a line (lag in its middle s, drift s/s) and the samples that
+    /// `together` picks.
+    pub(super) fn stretch(
+        r: &Rates,
+        range: Range<usize>,
+        line: (f64, f64),
+        together: &[bool],
+    ) -> Option<Self> {
+        Self::new(r, range, line, Some(together))
     }
 
     /// Gauss-Newton over (lag, drift, gain, offset), whitened at every step.
-    fn new(r: &Rates, range: Range<usize>, start: (f64, f64), drifts: bool) -> Option<Self> {
+    fn new(
+        r: &Rates,
+        range: Range<usize>,
+        start: (f64, f64),
+        drifting: Option<&[bool]>,
+    ) -> Option<Self> {
+        let drifts = drifting.is_some();
+        let picked = |i: usize| drifting.is_none_or(|t| t.get(i).copied().unwrap_or(false));
         let middle = 0.5 * (range.start + range.end) as f64 * Rates::STEP_S;
         let half = 0.5 * range.len() as f64 * Rates::STEP_S;
         // Drift is scaled by the half length so that all columns have like size.
@@ -139,7 +165,7 @@ impl Fit {
                 let u = (t - middle) / half;
                 let found = expand(&r.fine_y, t - p[0] - p[1] * u);
                 let (y, slope, bend) = found.unwrap_or((0.0, 0.0, 0.0));
-                ok.push(found.is_some());
+                ok.push(found.is_some() && picked(i));
                 residual.push(r.x.get(i).copied().unwrap_or(0.0) - p[2] * y - p[3]);
                 for (c, v) in columns.iter_mut().zip([
                     -p[2] * slope,
@@ -163,7 +189,7 @@ impl Fit {
             }
             let gradient = Vector4::from_fn(|i, _| dot(&white[i], &e));
             let step = information.cholesky()?.solve(&gradient);
-            last = Some((noise, ok, bends, information, white, e));
+            last = Some((noise, ok, bends, white, e));
             // The likelihood is a parabola only within the correlation length of the rates.
             let limit = (0.5 / step[0].abs().max(step[1].abs())).min(1.0);
             p += step * limit;
@@ -171,12 +197,11 @@ impl Fit {
                 break;
             }
         }
-        let (noise, ok, bends, information, white, e) = last?;
-        let bend: [f64; 3] = core::array::from_fn(|k| {
-            noise.apply(&bends[k], &ok).iter().zip(&e).map(|(a, b)| a * b).sum::<f64>()
-        });
-        let covariance = sandwich(information, bend, &white, &e, drifts)
-            .or_else(|| sandwich(information, [0.0; 3], &white, &e, drifts))?;
+        let (noise, ok, bends, white, e) = last?;
+        let bends = bends.map(|b| noise.apply(&b, &ok));
+        let nothing = core::array::from_fn(|_| vec![0.0; e.len()]);
+        let covariance = sandwich(&white, &bends, &e, drifts)
+            .or_else(|| sandwich(&white, &nothing, &e, drifts))?;
         let (lag_s, drift_s_s) = (p[0], if drifts { p[1] / half } else { 0.0 });
         let fit = Self {
             lag_s,

@@ -198,7 +198,8 @@ pub fn track(rates: &Rates) -> Option<ClockTrack> {
     let coarse = lag::coarse(rates)?;
     let windows = lag::windows(rates, coarse);
     let pieces = partition::pieces(&windows)?;
-    let stretches = stretches(rates, partition::boundaries(rates, &pieces));
+    let together = lag::together(rates, &windows);
+    let stretches = stretches(rates, partition::boundaries(rates, &pieces), &together);
     let all = 0..rates.x.len().min(rates.y.len());
     stretches.iter().any(|s| s.correlation > TOGETHER).then(|| ClockTrack {
         correlation_as_recorded: likelihood::correlation(rates, all, |_| 0.0),
@@ -207,9 +208,10 @@ pub fn track(rates: &Rates) -> Option<ClockTrack> {
 }
 
 /// Fits every stretch; joins neighbours between which no jump is certain.
-fn stretches(rates: &Rates, mut bounds: Vec<Bounds>) -> Vec<ClockStretch> {
+fn stretches(rates: &Rates, mut bounds: Vec<Bounds>, together: &[bool]) -> Vec<ClockStretch> {
     loop {
-        let fits: Vec<Option<ClockStretch>> = bounds.iter().map(|b| stretch(rates, b)).collect();
+        let of = |b: &Bounds| stretch(rates, b, together);
+        let fits: Vec<Option<ClockStretch>> = bounds.iter().map(of).collect();
         let join = fits.windows(2).position(|pair| match pair {
             [Some(a), Some(b)] => !ClockStretch::jumps(a, b),
             _ => true,
@@ -220,7 +222,7 @@ fn stretches(rates: &Rates, mut bounds: Vec<Bounds>) -> Vec<ClockStretch> {
     }
 }
 
-fn stretch(rates: &Rates, bounds: &Bounds) -> Option<ClockStretch> {
+fn stretch(rates: &Rates, bounds: &Bounds, together: &[bool]) -> Option<ClockStretch> {
     let (from_s, to_s) =
         (bounds.samples.start as f64 * Rates::STEP_S, bounds.samples.end as f64 * Rates::STEP_S);
     if to_s - from_s < SHORTEST_S {
@@ -229,7 +231,7 @@ fn stretch(rates: &Rates, bounds: &Bounds) -> Option<ClockStretch> {
     // A jump is placed to within seconds.
     let margin = (MARGIN_S / Rates::STEP_S) as usize;
     let inner = bounds.samples.start + margin..bounds.samples.end - margin;
-    let fit = Fit::stretch(rates, inner, bounds.line)?;
+    let fit = Fit::stretch(rates, inner, bounds.line, together)?;
     // A uniform spread of independent windows along the stretch.
     let drift_scatter = bounds.scatter_s * 12.0_f64.sqrt() / (to_s - from_s);
     Some(ClockStretch {

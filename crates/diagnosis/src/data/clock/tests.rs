@@ -27,9 +27,19 @@ fn drive(rng: &mut ChaCha8Rng) -> impl Fn(f64) -> f64 + use<> {
 fn pair(seed: u64, duration_s: f64, lag: impl Fn(f64) -> f64) -> (Vec<f64>, Vec<f64>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let v = drive(&mut rng);
+    noisy(&mut rng, duration_s, v, lag)
+}
+
+/// The same of a speed that is given.
+fn noisy(
+    rng: &mut ChaCha8Rng,
+    duration_s: f64,
+    v: impl Fn(f64) -> f64,
+    lag: impl Fn(f64) -> f64,
+) -> (Vec<f64>, Vec<f64>) {
     let n = (duration_s / STEP_S) as usize;
     let mut noisy = |value: f64, sigma: f64, quantum: f64| {
-        ((value + sigma * normal(&mut rng)) / quantum).round() * quantum
+        ((value + sigma * normal(rng)) / quantum).round() * quantum
     };
     let x = (0..n).map(|i| i as f64 * STEP_S).map(|t| noisy(v(t - lag(t)), 0.05, 0.01)).collect();
     let y = (0..n).map(|i| noisy(v(i as f64 * STEP_S), 0.03, 1.0 / 256.0)).collect();
@@ -55,6 +65,24 @@ fn offset_and_drift_lie_within_their_intervals_as_often_as_these_say() {
         drifts += usize::from((s.drift_s_s - drift).abs() < 2.0 * s.drift_sigma_s_s);
     }
     assert!(offsets >= 25 && drifts >= 25, "{offsets} and {drifts} of 30 within two sigma");
+}
+
+/// A truck under cruise control on a flat road with one hill: its clock was half a second off at the
+/// start and late at the end, each by several standard deviations, from the noise of steady speeds.
+#[test]
+fn steady_speeds_say_nothing_of_a_clock() {
+    for seed in 60..90 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let hill_s = 150.0 + 450.0 * rng.random::<f64>();
+        let v = |t: f64| 22.0 - 3.0 * (-((t - hill_s) / 20.0).powi(2)).exp();
+        let (x, y) = noisy(&mut rng, 750.0, v, |_| 0.0);
+        let Some(track) = tracked(&x, &y) else { continue };
+        for s in &track.stretches {
+            let grown = s.drift_s_s * (s.to_s - s.from_s);
+            let sigma = s.drift_sigma_s_s * (s.to_s - s.from_s);
+            assert!(grown.abs() < 0.25_f64.max(CERTAIN * sigma), "seed {seed}: {s:?}");
+        }
+    }
 }
 
 #[test]
