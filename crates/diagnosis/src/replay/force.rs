@@ -143,9 +143,9 @@ impl<'a> Longitudinal<'a> {
         }
     }
 
-    /// Acceleration of the samples from `at` on at speeds `v`, m/s.
+    /// Force of the engine and its brake at the wheels from `at` on, N.
     #[inline(always)]
-    pub(crate) fn acceleration<const L: usize>(&self, at: usize, v: &[f64; L]) -> [f64; L] {
+    pub(super) fn drive_n<const L: usize>(&self, at: usize) -> [f64; L] {
         let d = self.d;
         let (indicated, friction) = (cut::<L>(&d.indicated_nm, at), cut::<L>(&d.friction_nm, at));
         let auxiliary = cut::<L>(&d.auxiliary_nm, at);
@@ -164,10 +164,24 @@ impl<'a> Longitudinal<'a> {
             }
         }
         let meshes = cut::<L>(&d.meshes, at);
-        let mut force: [f64; L] = lanes(|j| {
+        lanes(|j| {
             let efficiency = with_mesh_loss(self.efficiency, self.mesh_loss, meshes[j]);
             with_losses_n(net[j] * ratio[j], efficiency)
-        });
+        })
+    }
+
+    /// Force of the service brakes while cold from `at` on, N.
+    #[inline(always)]
+    pub(super) fn service_n<const L: usize>(&self, at: usize) -> [f64; L] {
+        let service_n = cut::<L>(&self.service_n, at);
+        lanes(|j| self.brake * service_n[j])
+    }
+
+    /// Acceleration of the samples from `at` on at speeds `v`, m/s.
+    #[inline(always)]
+    pub(crate) fn acceleration<const L: usize>(&self, at: usize, v: &[f64; L]) -> [f64; L] {
+        let d = self.d;
+        let mut force: [f64; L] = self.drive_n(at);
         let air = self.air(at, v);
         let mut cold = [1.0; L];
         if let Some(left) = &self.cold_left {
@@ -182,8 +196,7 @@ impl<'a> Longitudinal<'a> {
                 + rolling_n(self.mass_kg, cos[j], self.rolling_coeff + by_speed[j], cold[j])
                 + grade_n(self.mass_kg, cos[j] * (grade[j] + self.grade_bias));
         }
-        let service_n = cut::<L>(&self.service_n, at);
-        let mut service: [f64; L] = lanes(|j| self.brake * service_n[j]);
+        let mut service: [f64; L] = self.service_n(at);
         if let Some(heat) = &self.heat {
             let (heat, air_k) = (cut::<L>(heat, at), cut::<L>(&d.air_k, at));
             let (loss, from) = self.fade;

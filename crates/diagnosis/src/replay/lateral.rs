@@ -1,5 +1,6 @@
 //! Tractor yaw rate, trailer yaw rate and lateral acceleration from hand wheel and speed, with the
-//! linear tractor-semitrailer model of `dynamics::lateral` at the measured speed.
+//! tractor-semitrailer model of `dynamics::lateral` at the measured speed; tyres that saturate have at
+//! every sample the stiffness of their slip and load there (`grip`).
 //!
 //! All tyres have one relaxation length, so that their forces on the bodies lag as one: three states
 //! instead of one per axle.
@@ -9,6 +10,7 @@ use tractrix_core::GRAVITY_M_S2;
 
 use super::Module as M;
 use super::air::SideForce;
+use super::grip::{Acting, Grip};
 use super::inputs::BLOCK;
 use super::prepared::{Prepared, at_index};
 use crate::causes::param::{P, Theta};
@@ -41,17 +43,17 @@ fn stiffness(d: &Prepared, plant: &Plant, t: &Theta) -> [f64; dynamics::lateral:
 }
 
 /// Lateral velocity, yaw rates of tractor and trailer, articulation.
-type State = [f64; 4];
+pub(super) type State = [f64; 4];
 
 /// `x + y h`, element by element.
 #[inline(always)]
-fn plus(x: &State, y: &State, h: f64) -> State {
+pub(super) fn plus(x: &State, y: &State, h: f64) -> State {
     core::array::from_fn(|i| x[i] + y[i] * h)
 }
 
 /// The state matrix of any speed, `A(v) s = tyres (s_0 / v, s_1 / v, s_2 / v, s_3) + turn v s_1` in its
 /// first three rows, and the input columns.
-struct BySpeed {
+pub(super) struct BySpeed {
     /// By columns.
     tyres: [State; 4],
     turn: State,
@@ -62,7 +64,7 @@ struct BySpeed {
 }
 
 impl BySpeed {
-    fn new(model: &YawSideslip) -> Self {
+    pub(super) fn new(model: &YawSideslip) -> Self {
         let (x, y) = (model.state_space(1.0), model.state_space(2.0));
         let column = |a: &[State; 4], j: usize| -> State {
             core::array::from_fn(|i| if i < 3 { a[i][j] } else { 0.0 })
@@ -80,9 +82,14 @@ impl BySpeed {
         }
     }
 
+    /// Accelerations by a side force at the trailer's centre of gravity and by a yaw moment on it.
+    pub(super) fn trailer(&self) -> [&State; 2] {
+        [&self.trailer, &self.trailer_moment]
+    }
+
     /// Accelerations by the tyres' steady side forces per state, by columns, at `1 / v`.
     #[inline(always)]
-    fn tyres(&self, per_speed: f64) -> [State; 4] {
+    pub(super) fn tyres(&self, per_speed: f64) -> [State; 4] {
         let [a, b, c, d] = &self.tyres;
         [a.map(|x| x * per_speed), b.map(|x| x * per_speed), c.map(|x| x * per_speed), *d]
     }
@@ -115,6 +122,7 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
         *c *= 1.0 + scale[[0, 1, 1, 2, 2, 2][axle]];
     }
     let system = BySpeed::new(&model);
+    let grip = Grip::new(d, &model, &system);
     let mut road_wheel = RoadWheel::new(d, plant, t);
     let bank_m_s2 = GRAVITY_M_S2 * t[P::Bank as usize];
     // The bank pulls on both bodies, and the wind pushes them in a fixed proportion.
@@ -153,17 +161,22 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
             let side = plus(&bank, &wind, force);
             let before = next;
             next = road_wheel.step(i + 1);
-            let steer = |angle: f64| system.steer.map(|x| x * angle);
+            let Acting { tyres, steer_frac, pulled } = match &grip {
+                Some(grip) => grip.acting(i, v, &s, before),
+                None => Acting::of(system.tyres(w)),
+            };
+            let steer = |angle: f64| system.steer.map(|x| x * (steer_frac * angle));
             let middle = steer(0.5 * (before + next));
             // Runge and Kutta's steps of the bodies; the tyres' lag is solved exactly over each half
             // for goals that move evenly, so that no speed makes a short length unstable.
-            let tyres = system.tyres(w);
             let goal = rate(&tyres, &s, &steer(before));
             let built = plus(&kept, &goal, end);
             let (keep, [begin, part]) = first_order_hold(relaxation_m * w, 0.5 * dt);
             end = part;
-            let a = system.matrix(&tyres, end, v);
+            let mut a = system.matrix(&tyres, end, v);
+            a[3] = plus(&a[3], &pulled, 1.0);
             let mut k1 = plus(&plus(&built, &side, 1.0), &system.turn, v * s[1]);
+            k1 = plus(&k1, &pulled, s[3]);
             k1[3] = s[1] - s[2];
             let lateral = k1[0] + v * s[1] + bank_m_s2;
             out[0][i / 2] += 0.5 * (d.yaw[i] - s[1] - bias[0]);

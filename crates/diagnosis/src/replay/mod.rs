@@ -10,6 +10,7 @@ mod brake;
 mod co2;
 mod engaged;
 pub(crate) mod force;
+mod grip;
 mod inputs;
 mod lateral;
 pub(crate) mod parts;

@@ -6,6 +6,7 @@ use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::co2;
 use super::engaged::{engaged, runs, steady_ratio};
+use super::grip::Along;
 use super::inputs::Inputs;
 use super::profiles::Profiles;
 use super::section::GradeBySection;
@@ -60,6 +61,8 @@ pub(crate) struct Prepared {
     /// Full-load torque at the engine speed of every sample, Nm.
     pub(super) full_load: Vec<f64>,
     pub(super) balance: Inputs,
+    /// What is driven and braked, for tyres that saturate; else nothing.
+    pub(super) along: Vec<Along>,
     pub(super) profiles: Profiles,
     /// The ratio of the driveline is that of engine and road speed: nobody logged the gear.
     pub(super) measured_ratio: bool,
@@ -156,6 +159,7 @@ impl Prepared {
             omega,
             turning,
             balance: Inputs::default(),
+            along: Vec::new(),
             profiles: Profiles::default(),
             speed,
             rpm,
@@ -175,6 +179,7 @@ impl Prepared {
         d.mask(plant);
         d.fine_pressure = super::brake::resolved(&d, plant);
         d.balance = Inputs::new(&d, plant);
+        d.along = super::grip::along(&d, plant);
         d
     }
 

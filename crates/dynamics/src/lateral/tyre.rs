@@ -118,6 +118,21 @@ pub struct LoadedAxle {
 }
 
 impl TyreLaw {
+    /// Part of the side force that a longitudinal force, N, leaves of an axle's under this load, N: the
+    /// friction ellipse; 1 for the linear law.
+    #[inline]
+    #[must_use]
+    pub fn left_frac(self, load_n: f64, longitudinal_force_n: f64) -> f64 {
+        match self {
+            Self::Linear => 1.0,
+            Self::Saturating { friction_coeff } => {
+                let limit = friction_coeff * load_n.max(1.0);
+                let used = (longitudinal_force_n / limit).clamp(-0.99, 0.99);
+                libm::sqrt(1.0 - used * used)
+            }
+        }
+    }
+
     /// The axle under load: cornering stiffness, N/rad; vertical load, N; longitudinal force, N.
     #[inline]
     #[must_use]
@@ -133,8 +148,7 @@ impl TyreLaw {
             }
             Self::Saturating { friction_coeff } => {
                 let limit = friction_coeff * load_n.max(1.0);
-                let used = (longitudinal_force_n / limit).clamp(-0.99, 0.99);
-                let left = libm::sqrt(1.0 - used * used);
+                let left = self.left_frac(load_n, longitudinal_force_n);
                 LoadedAxle {
                     stiffness_n_rad: stiffness_n_rad * left,
                     limit_n: limit * left,
@@ -154,9 +168,25 @@ impl LoadedAxle {
             return self.stiffness_n_rad * slip_rad;
         }
         let z = (self.steepness_per_rad * slip_rad).clamp(-1.0, 1.0);
-        let z2 = z * z;
-        self.limit_n * z * (1.875 - 1.25 * z2 + 0.375 * z2 * z2)
+        self.limit_n * z * polynomial(z)
     }
+
+    /// Side force over that of the stiffness alone at this slip angle, rad, up to the friction limit.
+    #[inline]
+    #[must_use]
+    pub fn kept_frac(&self, slip_rad: f64) -> f64 {
+        polynomial((self.steepness_per_rad * slip_rad).clamp(-1.0, 1.0)) / SLOPE
+    }
+}
+
+/// Slope of the side force at no slip, in `z` and parts of the largest force.
+const SLOPE: f64 = 1.875;
+
+/// `(15 - 10 z² + 3 z⁴) / 8`.
+#[inline]
+fn polynomial(z: f64) -> f64 {
+    let z2 = z * z;
+    SLOPE - 1.25 * z2 + 0.375 * z2 * z2
 }
 
 #[cfg(test)]
@@ -182,6 +212,19 @@ mod tests {
             law.under_load(4e5, 6e4, 0.0).side_force_n(-0.05),
             -law.under_load(4e5, 6e4, 0.0).side_force_n(0.05)
         );
+    }
+
+    #[test]
+    fn what_is_kept_of_the_stiffness_is_the_secant_of_the_side_force() {
+        let law = TyreLaw::Saturating { friction_coeff: 0.8 };
+        let axle = law.under_load(4e5, 6e4, 2e4);
+        for slip in [-0.08, 0.02, 0.05] {
+            let secant = axle.side_force_n(slip) / (4e5 * slip);
+            let kept = law.left_frac(6e4, 2e4) * axle.kept_frac(slip);
+            assert!((secant - kept).abs() < 1e-12, "{secant} {kept}");
+        }
+        assert_eq!(TyreLaw::Linear.under_load(4e5, 6e4, 2e4).kept_frac(0.1), 1.0);
+        assert_eq!(TyreLaw::Linear.left_frac(6e4, 2e4), 1.0);
     }
 
     #[test]

@@ -192,7 +192,8 @@ impl YawSideslip {
 
     /// Slip angle of every axle, rad, positive when it gives a force to the left.
     #[inline]
-    pub(super) fn slip_rad(&self, v: f64, s: &[f64; 4], delta: f64) -> [f64; AXLES] {
+    #[must_use]
+    pub fn slip_rad(&self, v: f64, s: &[f64; 4], delta: f64) -> [f64; AXLES] {
         let x = &self.axle_position_m;
         let [vy, wc, wt, gamma] = *s;
         let w = 1.0 / v;
