@@ -4,15 +4,16 @@
 //! With them what the same forces do by the angles between the bodies and of the road wheels.
 //!
 //! A tractor with one drive axle climbs with 1 to 7 % less of it, and without that a payload lay
-//! elsewhere (143 nats) or drive tyres were soft (71) beside a hidden drag or mass.
+//! elsewhere (143 nats) or drive tyres were soft (71) beside a hidden drag or mass. Left out: the
+//! retarder's force, which a cause may change.
 
-use dynamics::lateral::{AXLES, LoadedAxle, TyreLaw, YawSideslip};
+use dynamics::TruckParameters;
+use dynamics::lateral::{AXLES, LoadedAxle, YawSideslip};
 
 use super::force::Longitudinal;
-use super::inputs::{BLOCK, cut};
-use super::lateral::{BySpeed, State, loaded, plus};
+use super::inputs::BLOCK;
+use super::lateral::{BySpeed, State, plus};
 use super::prepared::Prepared;
-use super::retarder::retarder_n;
 use crate::causes::param::PARAMS;
 use crate::{Drive, Plant};
 
@@ -22,48 +23,42 @@ const HALF_SECOND: usize = 10;
 /// Steer axle, drive axles, trailer axles.
 const GROUPS: [core::ops::Range<usize>; 3] = [0..1, 1..3, 3..6];
 
-/// What is driven and braked at a sample, with the truck file's figures and the load sheet's mass.
+/// What is driven and braked at a sample.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Along {
-    /// Part of the side force that it leaves of each group.
-    left_frac: [f64; 3],
-    /// Force of the steer axle and of the trailer's, N.
-    steer_n: f64,
-    trailer_n: f64,
+    /// Forces of the engine and of the service brakes at the wheels, N.
+    drive_n: f64,
+    service_n: f64,
     /// Change of speed and gravity's component along the road, m/s².
     specific_m_s2: f64,
 }
 
-/// The same for every sample; nothing for tyres that do not saturate.
-pub(super) fn along(d: &Prepared, plant: &Plant) -> Vec<Along> {
-    let law = plant.lateral.tyres.law;
-    if law == TyreLaw::Linear {
-        return Vec::new();
-    }
-    let theta = [0.0; PARAMS];
-    let load_n = loaded(d, plant, &theta).static_axle_load_n();
-    let total_n: f64 = load_n.iter().sum();
-    let balance = Longitudinal::new(d, plant, &theta);
-    let retarder_n = retarder_n(d, plant, 0.0);
+/// The truck without what causes put on its forces: those are figures of the balance, which the side
+/// forces would only blur.
+pub(super) fn as_built(truck: &TruckParameters) -> TruckParameters {
+    let mut out = truck.clone();
+    (out.engine.friction_scale_coeff, out.engine.engine_brake_scale_coeff) = (1.0, 1.0);
+    (out.driveline.loss_scale_coeff, out.driveline.mesh_loss_frac) = (1.0, 0.0);
+    out.engine.fan_power_w = 0.0;
+    out.brake.gain_scale_coeff = 1.0;
+    out
+}
+
+/// What is driven and braked at every sample, by the truck as it was built.
+pub(super) fn along(d: &Prepared, built: &Plant) -> Vec<Along> {
+    let balance = Longitudinal::new(d, built, &[0.0; PARAMS]);
     let mut out = Vec::with_capacity(d.balance.padded);
     for at in (0..d.balance.padded).step_by(BLOCK) {
         let (drive_n, service_n) = (balance.drive_n::<BLOCK>(at), balance.service_n::<BLOCK>(at));
-        let retards: [f64; BLOCK] = retarder_n.as_ref().map_or([0.0; BLOCK], |n| *cut(n, at));
         out.extend((0..BLOCK).map(|j| {
-            let group_n = |g: usize| load_n[GROUPS[g].clone()].iter().sum::<f64>();
-            let along_n: [f64; 3] = core::array::from_fn(|g| {
-                let drives_n = if g == 1 { drive_n[j] - retards[j] } else { 0.0 };
-                drives_n - service_n[j] * group_n(g) / total_n
-            });
-            let (i, second) = ((at + j).min(d.n - 1), HALF_SECOND);
-            let (before, after) = (i.saturating_sub(second), (i + second).min(d.n - 1));
+            let i = (at + j).min(d.n - 1);
+            let (before, after) = (i.saturating_sub(HALF_SECOND), (i + HALF_SECOND).min(d.n - 1));
             let over_s = (after - before).max(1) as f64 * Drive::STEP_S;
+            let change_m_s2 = (d.speed[after] - d.speed[before]) / over_s;
             Along {
-                left_frac: core::array::from_fn(|g| law.left_frac(group_n(g), along_n[g])),
-                steer_n: along_n[0],
-                trailer_n: along_n[2],
-                specific_m_s2: (d.speed[after] - d.speed[before]) / over_s
-                    + Prepared::gravity_along(d.grade[i]),
+                drive_n: drive_n[j],
+                service_n: service_n[j],
+                specific_m_s2: change_m_s2 + Prepared::gravity_along(d.grade[i]),
             }
         }));
     }
@@ -93,6 +88,8 @@ pub(super) struct Grip<'a> {
     along: &'a [Along],
     system: &'a BySpeed,
     axles: [LoadedAxle; AXLES],
+    /// Loads of the groups, N.
+    load_n: [f64; 3],
     /// The tyres of one group alone.
     groups: [BySpeed; 3],
 }
@@ -116,6 +113,7 @@ impl<'a> Grip<'a> {
             along: &d.along,
             system,
             axles: core::array::from_fn(|j| model.law.under_load(c[j], load_n[j], 0.0)),
+            load_n: GROUPS.map(|axles| load_n[axles].iter().sum()),
             groups: GROUPS.map(of),
         })
     }
@@ -125,10 +123,14 @@ impl<'a> Grip<'a> {
     pub(super) fn acting(&self, i: usize, v: f64, s: &State, angle: f64) -> Acting {
         let (along, model) = (&self.along[i.min(self.along.len() - 1)], self.model);
         let slip = model.slip_rad(v, s, angle);
+        let per_load = along.service_n / self.load_n.iter().sum::<f64>();
+        let [steer_n, braked_n, trailer_n] = self.load_n.map(|load_n| -per_load * load_n);
+        let along_n = [steer_n, along.drive_n + braked_n, trailer_n];
         let mut tyres = [[0.0; 4]; 4];
         let mut front = 1.0;
-        for (g, (group, left)) in self.groups.iter().zip(along.left_frac).enumerate() {
+        for (g, group) in self.groups.iter().enumerate() {
             let middle = GROUPS[g].start + GROUPS[g].len() / 2;
+            let left = model.law.left_frac(self.load_n[g], along_n[g]);
             let kept = left * self.axles[middle].kept_frac(slip[middle]);
             for (sum, own) in tyres.iter_mut().zip(group.tyres(1.0 / v)) {
                 *sum = plus(sum, &own, kept);
@@ -136,21 +138,21 @@ impl<'a> Grip<'a> {
             front = if g == 0 { kept } else { front };
         }
         let lever_m = model.trailer_cg_behind_hitch_m;
-        let moment_nm = lever_m * (model.trailer_mass_kg * along.specific_m_s2 - along.trailer_n);
+        let moment_nm = lever_m * (model.trailer_mass_kg * along.specific_m_s2 - trailer_n);
         let [force, moment] = self.system.trailer();
         Acting {
             tyres,
-            steer_frac: front + along.steer_n / model.stiffness_n_rad[0].max(1.0),
-            pulled: plus(&force.map(|x| -along.trailer_n * x), moment, moment_nm),
+            steer_frac: front + steer_n / model.stiffness_n_rad[0].max(1.0),
+            pulled: plus(&force.map(|x| -trailer_n * x), moment, moment_nm),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use dynamics::TruckParameters;
-    use dynamics::lateral::{LateralInputs, LateralModel, LateralState};
+    use dynamics::lateral::{LateralInputs, LateralModel, LateralState, TyreLaw};
 
+    use super::super::lateral::loaded;
     use super::*;
     use crate::Channel as C;
 

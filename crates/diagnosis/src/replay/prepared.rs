@@ -2,11 +2,12 @@
 
 use dynamics::effects::resistance::air_density_kg_m3;
 use dynamics::effects::table::TableSignal;
+use dynamics::lateral::TyreLaw;
 use tractrix_core::{GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::co2;
 use super::engaged::{engaged, runs, steady_ratio};
-use super::grip::Along;
+use super::grip::{Along, along, as_built};
 use super::inputs::Inputs;
 use super::profiles::Profiles;
 use super::section::GradeBySection;
@@ -178,9 +179,21 @@ impl Prepared {
         };
         d.mask(plant);
         d.fine_pressure = super::brake::resolved(&d, plant);
+        d.along = d.along(plant);
         d.balance = Inputs::new(&d, plant);
-        d.along = super::grip::along(&d, plant);
         d
+    }
+
+    /// What is driven and braked by the truck as it was built; nothing where tyres do not saturate.
+    fn along(&mut self, plant: &Plant) -> Vec<Along> {
+        let saturates = plant.lateral.tyres.law != TyreLaw::Linear;
+        let built = Plant::of_truck(&as_built(&plant.truck)).ok().filter(|_| saturates);
+        built.map_or_else(Vec::new, |built| {
+            self.balance = Inputs::new(self, &built);
+            let along = along(self, &built);
+            self.profiles = Profiles::default();
+            along
+        })
     }
 
     /// The measured signal that a module explains; empty for shifts, which are events.
