@@ -85,43 +85,30 @@ pub(super) fn squared_residuals(
 }
 
 /// Covariance that holds although y is noisy too: the bend of the residual takes the noise of y's
-/// slope out of the information (its mean is minus the noise's part). From the scores of blocks, which
-/// may be correlated inside, each by what leaving it out would move (the jackknife of clusters: Bell and
-/// McCaffrey, Survey Methodology 28(2), 2002): one block that says nearly all says it alone.
+/// slope out of the information (its mean is minus the noise's part), and the scores are summed
+/// over blocks, which may be correlated inside (White, Econometrica 50(1), 1982).
 fn sandwich(
+    mut hessian: Matrix4<f64>,
+    bend: [f64; 3],
     white: &[Vec<f64>; 4],
-    bends: &[Vec<f64>; 3],
     e: &[f64],
     drifts: bool,
 ) -> Option<Matrix4<f64>> {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let blocks: Vec<(Matrix4<f64>, Vector4<f64>)> = (0..e.len())
-        .step_by(BLOCK)
-        .map(|from| {
-            let block = from..(from + BLOCK).min(e.len());
-            let part = |k: usize| &white[k][block.clone()];
-            let mut hessian = Matrix4::from_fn(|i, j| dot(part(i), part(j)));
-            let bend = |k: usize| dot(&bends[k][block.clone()], &e[block.clone()]);
-            hessian[(0, 0)] -= bend(0);
-            if drifts {
-                hessian[(0, 1)] -= bend(1);
-                hessian[(1, 0)] -= bend(1);
-                hessian[(1, 1)] -= bend(2);
-            }
-            (hessian, Vector4::from_fn(|k, _| dot(part(k), &e[block.clone()])))
-        })
-        .collect();
-    let mut hessian: Matrix4<f64> = blocks.iter().map(|b| b.0).sum();
-    if !drifts {
-        hessian[(1, 1)] = 1.0;
+    hessian[(0, 0)] -= bend[0];
+    if drifts {
+        hessian[(0, 1)] -= bend[1];
+        hessian[(1, 0)] -= bend[1];
+        hessian[(1, 1)] -= bend[2];
     }
-    let mut out = Matrix4::zeros();
-    for (own, score) in &blocks {
-        // Far from the peak the bend may exceed the information.
-        let moved = (hessian - own).cholesky()?.solve(score);
-        out += moved * moved.transpose();
+    // Far from the peak the bend may exceed the information.
+    let inverse = hessian.cholesky()?.inverse();
+    let mut scores = Matrix4::zeros();
+    for from in (0..e.len()).step_by(BLOCK) {
+        let block = from..(from + BLOCK).min(e.len());
+        let score = Vector4::from_fn(|k, _| block.clone().map(|i| white[k][i] * e[i]).sum::<f64>());
+        scores += score * score.transpose();
     }
-    Some(out)
+    Some(inverse * scores * inverse)
 }
 
 impl Fit {
@@ -189,7 +176,7 @@ impl Fit {
             }
             let gradient = Vector4::from_fn(|i, _| dot(&white[i], &e));
             let step = information.cholesky()?.solve(&gradient);
-            last = Some((noise, ok, bends, white, e));
+            last = Some((noise, ok, bends, information, white, e));
             // The likelihood is a parabola only within the correlation length of the rates.
             let limit = (0.5 / step[0].abs().max(step[1].abs())).min(1.0);
             p += step * limit;
@@ -197,11 +184,12 @@ impl Fit {
                 break;
             }
         }
-        let (noise, ok, bends, white, e) = last?;
-        let bends = bends.map(|b| noise.apply(&b, &ok));
-        let nothing = core::array::from_fn(|_| vec![0.0; e.len()]);
-        let covariance = sandwich(&white, &bends, &e, drifts)
-            .or_else(|| sandwich(&white, &nothing, &e, drifts))?;
+        let (noise, ok, bends, information, white, e) = last?;
+        let bend: [f64; 3] = core::array::from_fn(|k| {
+            noise.apply(&bends[k], &ok).iter().zip(&e).map(|(a, b)| a * b).sum::<f64>()
+        });
+        let covariance = sandwich(information, bend, &white, &e, drifts)
+            .or_else(|| sandwich(information, [0.0; 3], &white, &e, drifts))?;
         let (lag_s, drift_s_s) = (p[0], if drifts { p[1] / half } else { 0.0 });
         let fit = Self {
             lag_s,
