@@ -8,7 +8,7 @@
 //! retarder's force, which a cause may change.
 
 use dynamics::TruckParameters;
-use dynamics::lateral::{AXLES, LoadedAxle, YawSideslip};
+use dynamics::lateral::{AXLES, GROUP_AXLES, LoadedAxle, YawSideslip};
 
 use super::force::Longitudinal;
 use super::inputs::BLOCK;
@@ -19,9 +19,6 @@ use crate::{Drive, Plant};
 
 /// Samples over which a change of speed is taken, to either side.
 const HALF_SECOND: usize = 10;
-
-/// Steer axle, drive axles, trailer axles.
-const GROUPS: [core::ops::Range<usize>; 3] = [0..1, 1..3, 3..6];
 
 /// What is driven and braked at a sample.
 #[derive(Debug, Clone, Copy, Default)]
@@ -113,8 +110,8 @@ impl<'a> Grip<'a> {
             along: &d.along,
             system,
             axles: core::array::from_fn(|j| model.law.under_load(c[j], load_n[j], 0.0)),
-            load_n: GROUPS.map(|axles| load_n[axles].iter().sum()),
-            groups: GROUPS.map(of),
+            load_n: GROUP_AXLES.map(|axles| load_n[axles].iter().sum()),
+            groups: GROUP_AXLES.map(of),
         })
     }
 
@@ -129,7 +126,7 @@ impl<'a> Grip<'a> {
         let mut tyres = [[0.0; 4]; 4];
         let mut front = 1.0;
         for (g, group) in self.groups.iter().enumerate() {
-            let middle = GROUPS[g].start + GROUPS[g].len() / 2;
+            let middle = GROUP_AXLES[g].start + GROUP_AXLES[g].len() / 2;
             let left = model.law.left_frac(self.load_n[g], along_n[g]);
             let kept = left * self.axles[middle].kept_frac(slip[middle]);
             for (sum, own) in tyres.iter_mut().zip(group.tyres(1.0 / v)) {
@@ -193,7 +190,7 @@ mod tests {
             let [drive_n] = balance.drive_n::<1>(i);
             let [service_n] = balance.service_n::<1>(i);
             let along_n = core::array::from_fn(|j| {
-                let drives = if GROUPS[1].contains(&j) { 0.5 * drive_n } else { 0.0 };
+                let drives = if GROUP_AXLES[1].contains(&j) { 0.5 * drive_n } else { 0.0 };
                 drives - service_n * load_n[j] / total_n
             });
             let last = i.min(n - 2);

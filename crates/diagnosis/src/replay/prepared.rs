@@ -186,14 +186,15 @@ impl Prepared {
 
     /// What is driven and braked by the truck as it was built; nothing where tyres do not saturate.
     fn along(&mut self, plant: &Plant) -> Vec<Along> {
-        let saturates = plant.lateral.tyres.law != TyreLaw::Linear;
-        let built = Plant::of_truck(&as_built(&plant.truck)).ok().filter(|_| saturates);
-        built.map_or_else(Vec::new, |built| {
-            self.balance = Inputs::new(self, &built);
-            let along = along(self, &built);
-            self.profiles = Profiles::default();
-            along
-        })
+        if plant.lateral.tyres.law == TyreLaw::Linear {
+            return Vec::new();
+        }
+        // what could be built is built without what causes put on it, too
+        let Ok(built) = Plant::of_truck(&as_built(&plant.truck)) else { return Vec::new() };
+        self.balance = Inputs::new(self, &built);
+        let along = along(self, &built);
+        self.profiles = Profiles::default();
+        along
     }
 
     /// The measured signal that a module explains; empty for shifts, which are events.

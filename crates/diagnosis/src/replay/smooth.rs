@@ -50,7 +50,8 @@ pub(super) fn quadratic(x: &[f64]) -> Vec<f64> {
 
 /// A record between its samples, by cubic B-splines: exact for straight lines, and with the same noise
 /// wherever it is read. A straight line between two noisy samples has half their noise in the middle,
-/// which a fit takes for the delay at which the records agree.
+/// which a fit takes for the delay at which the records agree. (Unser, IEEE Signal Processing Magazine
+/// 16(6), 1999; the samples themselves as coefficients.)
 pub(super) fn calm_at(x: &[f64], index: f64) -> f64 {
     let last = x.len() - 1;
     let index = index.clamp(0.0, last as f64);

@@ -44,7 +44,7 @@ pub use parameters::{
     LateralError, LateralParameters, PayloadParameters, TractorParameters, TrailerParameters,
 };
 pub use steering::{SteeringParameters, SteeringState};
-pub use tyre::{LoadedAxle, TyreLaw, TyreParameters};
+pub use tyre::{GROUP_AXLES, LoadedAxle, TyreLaw, TyreParameters};
 pub use yaw_sideslip::{StateSpace, YawSideslip};
 
 /// Number of axles: steer, two drive, three trailer. A single axle is a group of zero spread.

@@ -65,6 +65,9 @@ pub enum TyreLaw {
     },
 }
 
+/// Axles of the groups: steer, drive, trailer.
+pub const GROUP_AXLES: [core::ops::Range<usize>; 3] = [0..1, 1..3, 3..6];
+
 /// Group of an axle: 0 steer, 1 drive, 2 trailer.
 pub(super) const GROUP: [usize; AXLES] = [0, 1, 1, 2, 2, 2];
 
@@ -126,8 +129,8 @@ impl TyreLaw {
         match self {
             Self::Linear => 1.0,
             Self::Saturating { friction_coeff } => {
-                let limit = friction_coeff * load_n.max(1.0);
-                let used = (longitudinal_force_n / limit).clamp(-0.99, 0.99);
+                let used =
+                    (longitudinal_force_n / limit_n(friction_coeff, load_n)).clamp(-0.99, 0.99);
                 libm::sqrt(1.0 - used * used)
             }
         }
@@ -147,7 +150,7 @@ impl TyreLaw {
                 LoadedAxle { stiffness_n_rad, limit_n: f64::INFINITY, steepness_per_rad: 0.0 }
             }
             Self::Saturating { friction_coeff } => {
-                let limit = friction_coeff * load_n.max(1.0);
+                let limit = limit_n(friction_coeff, load_n);
                 let left = self.left_frac(load_n, longitudinal_force_n);
                 LoadedAxle {
                     stiffness_n_rad: stiffness_n_rad * left,
@@ -177,6 +180,12 @@ impl LoadedAxle {
     pub fn kept_frac(&self, slip_rad: f64) -> f64 {
         polynomial((self.steepness_per_rad * slip_rad).clamp(-1.0, 1.0)) / SLOPE
     }
+}
+
+/// Largest force of an axle in any direction, N.
+#[inline]
+fn limit_n(friction_coeff: f64, load_n: f64) -> f64 {
+    friction_coeff * load_n.max(1.0)
 }
 
 /// Slope of the side force at no slip, in `z` and parts of the largest force.

@@ -3,11 +3,11 @@
 use tractrix_core::{Command, GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use super::powertrain::Wheel;
-use super::{GROUP_AXLES, STANDSTILL_M_S, TruckModel};
+use super::{STANDSTILL_M_S, TruckModel};
 use crate::effects::brake::{BrakeParameters, GROUPS};
 use crate::effects::resistance::{AirFlow, air_density_kg_m3, grade_n};
 use crate::effects::table::{self, TableSignal};
-use crate::lateral::{AXLES, BodyForce, LateralInputs};
+use crate::lateral::{AXLES, BodyForce, GROUP_AXLES, LateralInputs};
 use crate::state::{Forces, RoadPatch, SUBSTEP_S, TruckState};
 
 impl TruckModel {

@@ -19,12 +19,10 @@ use crate::effects::cooling::HeatSources;
 use crate::effects::engine::Engine;
 use crate::effects::shift::ShiftState;
 use crate::effects::table::{self, TableSignal};
-use crate::lateral::{LateralInputs, LateralModel, LateralOutputs, LateralState};
+use crate::lateral::{GROUP_AXLES, LateralInputs, LateralModel, LateralOutputs, LateralState};
 use crate::state::{Forces, RoadPatch, SUBSTEP_S, TruckState};
 use crate::{DynamicsError, TruckParameters};
 
-/// Axles of each brake group: steer, drive, trailer.
-const GROUP_AXLES: [core::ops::Range<usize>; GROUPS] = [0..1, 1..3, 3..6];
 /// Speed below which static friction decides, m/s.
 const STANDSTILL_M_S: f64 = 1e-3;
 /// Coolant of a truck file without a cooling block: time constant, s, rise per indicated power, K/W,
