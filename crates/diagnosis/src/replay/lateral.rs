@@ -17,7 +17,7 @@ use crate::causes::param::{P, Theta};
 use crate::{Drive, Plant};
 
 /// Below this speed the linear model is stiff; rows there are masked.
-pub(super) const MIN_SPEED_M_S: f64 = 4.0;
+const MIN_SPEED_M_S: f64 = 4.0;
 
 /// Parameters of the drive's loading state, off by `t`.
 pub(crate) fn loaded(d: &Prepared, plant: &Plant, t: &Theta) -> LateralParameters {
@@ -124,10 +124,13 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
     let system = BySpeed::new(&model);
     let grip = Grip::new(d, &model, &system);
     let mut road_wheel = RoadWheel::new(d, plant, t);
-    // A bank pulls on both bodies, and the wind pushes them in a fixed proportion.
-    let bank = system.tractor.map(|b| -model.tractor_mass_kg * b);
-    let bank = plus(&bank, &system.trailer, -model.trailer_mass_kg);
-    let [even, curved] = [P::Bank, P::CurveBank].map(|p| GRAVITY_M_S2 * t[p as usize]);
+    let bank_m_s2 = GRAVITY_M_S2 * t[P::Bank as usize];
+    // The bank pulls on both bodies, and the wind pushes them in a fixed proportion.
+    let bank = plus(
+        &system.tractor.map(|b| -model.tractor_mass_kg * bank_m_s2 * b),
+        &system.trailer,
+        -model.trailer_mass_kg * bank_m_s2,
+    );
     let share = plant.truck.resistance.side_force_tractor_frac
         + t[P::SideShare as usize]
         + t[P::WindShare as usize]
@@ -141,7 +144,6 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
     let side_force = SideForce::new(d, plant, t);
     let speed_scale = 1.0 / (1.0 + t[P::SpeedScale as usize]);
     let bias = [P::YawBias, P::TrailerYawBias, P::AccelYBias].map(|p| t[p as usize]);
-    let ahead_m = t[P::AccelYAhead as usize];
     let relaxation_m = plant.lateral.tyres.relaxation_length_m;
     let relaxes = relaxation_m > 0.0;
     let dt = Drive::STEP_S;
@@ -156,8 +158,7 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
         for (i, force) in (from..2 * rows).zip(force) {
             let v = (d.speed[i] * speed_scale).max(MIN_SPEED_M_S);
             let w = 1.0 / v;
-            let bank_m_s2 = even - curved * d.bends[i];
-            let side = plus(&wind.map(|x| x * force), &bank, bank_m_s2);
+            let side = plus(&bank, &wind, force);
             let before = next;
             next = road_wheel.step(i + 1);
             let Acting { tyres, steer_frac, pulled } = match &grip {
@@ -177,7 +178,7 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
             let mut k1 = plus(&plus(&built, &side, 1.0), &system.turn, v * s[1]);
             k1 = plus(&k1, &pulled, s[3]);
             k1[3] = s[1] - s[2];
-            let lateral = k1[0] + v * s[1] + ahead_m * k1[1] + bank_m_s2;
+            let lateral = k1[0] + v * s[1] + bank_m_s2;
             out[0][i / 2] += 0.5 * (d.yaw[i] - s[1] - bias[0]);
             out[1][i / 2] += 0.5 * (d.trailer_yaw[i] - s[2] - bias[1]);
             out[2][i / 2] += 0.5 * (d.accel_y[i] - lateral - bias[2]);

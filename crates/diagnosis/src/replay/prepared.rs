@@ -9,7 +9,6 @@ use super::co2;
 use super::engaged::{engaged, runs, steady_ratio};
 use super::grip::{Along, along, as_built};
 use super::inputs::Inputs;
-use super::lateral::MIN_SPEED_M_S;
 use super::profiles::Profiles;
 use super::section::GradeBySection;
 use super::smooth;
@@ -55,8 +54,6 @@ pub(crate) struct Prepared {
     pub(crate) density: Vec<f64>,
     pub(crate) grade: Vec<f64>,
     pub(crate) curvature: Vec<f64>,
-    /// Curvature by which the road is banked, 1/m: the map's, or what the truck turns by.
-    pub(super) bends: Vec<f64>,
     pub(crate) s_map: Vec<f64>,
     pub(crate) grade_by_s: GradeBySection,
     /// Noise of the fuel rate and of the CO2 rate per row, g/s.
@@ -125,12 +122,6 @@ impl Prepared {
         } else {
             engaged(plant, &speed, &rpm, &gear, &shifting)
         };
-        let curvature = get(C::Curvature1M, 0.0);
-        let bends = if drive.has(C::Curvature1M) {
-            curvature.clone()
-        } else {
-            turns(&get(C::YawRateRadS, 0.0), &speed)
-        };
         let mut heading = get(C::HeadingRad, 0.0);
         unwrap(&mut heading);
         let mut d = Self {
@@ -161,8 +152,7 @@ impl Prepared {
             fuel: get(C::FuelRateGS, 0.0),
             co2: get(C::Co2RateGS, 0.0),
             coolant: smooth::running_mean(&get(C::CoolantTempDegc, 80.0), smooth::COOLANT),
-            curvature,
-            bends,
+            curvature: get(C::Curvature1M, 0.0),
             grade_by_s: GradeBySection::new(&s_map, &grade),
             fuel_noise_g_s: super::powertrain::noise_g_s(&get(C::FuelRateGS, 0.0)),
             co2_noise_g_s: co2::noise_g_s(&get(C::Co2RateGS, 0.0), &get(C::FuelRateGS, 0.0)),
@@ -277,13 +267,6 @@ impl Prepared {
     pub(crate) fn gravity_along(grade_frac: f64) -> f64 {
         GRAVITY_M_S2 * grade_frac / (1.0 + grade_frac * grade_frac).sqrt()
     }
-}
-
-/// Curvature of what the truck drives, 1/m, smoothed.
-fn turns(yaw_rad_s: &[f64], speed_m_s: &[f64]) -> Vec<f64> {
-    let turns: Vec<f64> =
-        yaw_rad_s.iter().zip(speed_m_s).map(|(w, v)| w / v.max(MIN_SPEED_M_S)).collect();
-    smooth::running_mean(&turns, smooth::BEND)
 }
 
 fn unwrap(angle: &mut [f64]) {

@@ -12,9 +12,6 @@ pub(super) const CRANK: usize = 10;
 /// message's kelvin.
 pub(super) const COOLANT: usize = 100;
 
-/// Samples on either side for the curvature of what is driven.
-pub(super) const BEND: usize = 20;
-
 /// Samples on either side for the hand wheel.
 const WHEEL: usize = 4;
 

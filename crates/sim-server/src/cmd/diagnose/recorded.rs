@@ -41,10 +41,11 @@ pub(super) fn recordings(path: &Path) -> Vec<PathBuf> {
 }
 
 /// Fields of `/truck/state` that are read, in the order of the message.
-const STATE_FIELDS: [&str; 16] = [
+const STATE_FIELDS: [&str; 17] = [
     "s_m",
     "grade_rad",
     "speed_m_s",
+    "accel_y_m_s2",
     "yaw_rate_rad_s",
     "trailer_yaw_rate_rad_s",
     "steering_wheel_rad",
@@ -62,26 +63,21 @@ const STATE_FIELDS: [&str; 16] = [
 /// Fields of `/odom` that are read.
 const ODOMETRY_FIELDS: [&str; 3] =
     ["pose.pose.position.z", "pose.pose.orientation.z", "pose.pose.orientation.w"];
-/// Fields of `/imu` that are read: with gravity's part, as a truck's own accelerometer.
-const IMU_FIELDS: [&str; 2] = ["linear_acceleration.x", "linear_acceleration.y"];
 
 /// What is read of a recording, by these numbers.
-const TOPICS: [Wanted<'_>; 3] = [
+const TOPICS: [Wanted<'_>; 2] = [
     Wanted { topic: "/truck/state", fields: &STATE_FIELDS },
     Wanted { topic: "/odom", fields: &ODOMETRY_FIELDS },
-    Wanted { topic: "/imu", fields: &IMU_FIELDS },
 ];
 const STATE: usize = 0;
 const ODOMETRY: usize = 1;
-const IMU: usize = 2;
 
-const COLUMNS: [&str; 21] = [
+const COLUMNS: [&str; 20] = [
     "time_s",
     "s_map_m",
     "speed_m_s",
     "gps_altitude_m",
     "heading_rad",
-    "accel_x_m_s2",
     "accelerator_pedal_frac",
     "engine_torque_percent",
     "engine_speed_rpm",
@@ -108,7 +104,6 @@ pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<T
     let name = folder.map_or_else(|| "run".to_owned(), |n| n.to_string_lossy().into_owned());
     let mut reader = Reader {
         altitude_heading: None,
-        accel_m_s2: None,
         scenario: None,
         table: Table::new(name, &COLUMNS),
         reference_torque_nm: truck.engine.reference_torque_nm,
@@ -138,7 +133,6 @@ pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<T
 
 struct Reader {
     altitude_heading: Option<(f64, f64)>,
-    accel_m_s2: Option<[f64; 2]>,
     scenario: Option<String>,
     table: Table,
     reference_torque_nm: f64,
@@ -155,7 +149,6 @@ impl Reader {
                 (ODOMETRY, [z, qz, qw]) => {
                     self.altitude_heading = Some((*z, 2.0 * qz.atan2(*qw)));
                 }
-                (IMU, [x, y]) => self.accel_m_s2 = Some([*x, *y]),
                 (STATE, values) if time.seconds() >= self.last_s + STEP_S - EARLY_S => {
                     self.state(time.seconds(), values);
                 }
@@ -169,8 +162,8 @@ impl Reader {
     }
 
     fn state(&mut self, time_s: f64, state: &[f64]) {
-        let (Some((z, heading)), Some([accel_x, accel_y]), Ok(state)) =
-            (self.altitude_heading, self.accel_m_s2, <[f64; STATE_FIELDS.len()]>::try_from(state))
+        let (Some((z, heading)), Ok(state)) =
+            (self.altitude_heading, <[f64; STATE_FIELDS.len()]>::try_from(state))
         else {
             return;
         };
@@ -178,6 +171,7 @@ impl Reader {
             s,
             grade,
             speed,
+            accel_y,
             yaw,
             trailer_yaw,
             wheel,
@@ -200,7 +194,6 @@ impl Reader {
             speed,
             z,
             heading,
-            accel_x,
             pedal,
             100.0 * torque / self.reference_torque_nm,
             rpm,
