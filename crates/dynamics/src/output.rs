@@ -106,6 +106,20 @@ impl TruckModel {
         }
     }
 
+    /// What an accelerometer fixed to the body at the reference point measures, m/s²: along and across
+    /// (positive left), with gravity's part on a grade and on a bank, where the map says `patch`. The
+    /// body's own pitch and roll on its springs are left out.
+    #[must_use]
+    pub fn specific_force_m_s2(&self, truth: &EgoState, patch: &RoadPatch) -> [f64; 2] {
+        let road = self.true_patch(patch);
+        let gravity = |angle_rad: f64| GRAVITY_M_S2 * libm::sin(angle_rad);
+        [
+            truth.accel_x_m_s2 - truth.lateral_speed_m_s * truth.yaw_rate_rad_s
+                + gravity(road.grade_rad),
+            truth.accel_y_m_s2 + gravity(road.bank_rad),
+        ]
+    }
+
     /// CO2 in the exhaust, g/s, as an instrument of this truck measures it.
     #[must_use]
     pub fn measured_co2_g_s(&self, truth: &EgoState) -> f64 {

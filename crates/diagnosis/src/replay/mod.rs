@@ -252,7 +252,9 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::SideShare
         | P::SideBehind
         | P::Bank
+        | P::CurveBank
         | P::AccelYBias
+        | P::AccelYAhead
         | P::TrailerYawBias => &[G::Lateral],
         P::GpsLag => &[G::Gps],
         P::ImuBias => &[G::Imu],

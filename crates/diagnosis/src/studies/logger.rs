@@ -7,7 +7,7 @@
 use dynamics::{RoadPatch, TruckModel};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use tractrix_core::{BrakeMode, Command, EgoState, GRAVITY_M_S2, RPM_PER_RAD_S, ZERO_DEGC_K};
+use tractrix_core::{BrakeMode, Command, EgoState, RPM_PER_RAD_S, ZERO_DEGC_K};
 
 use crate::Channel;
 use crate::data::channel::CHANNELS;
@@ -64,13 +64,14 @@ impl Sample<'_> {
         let (truth, c, patch) = (self.ego, self.command, self.patch);
         let e = self.model.measured(truth);
         let p = &e.powertrain;
+        let [accel_x_m_s2, accel_y_m_s2] = self.model.specific_force_m_s2(truth, patch);
         [
             truth.s_m,
             e.speed_m_s,
             truth.speed_m_s,
             patch.altitude_m,
             e.yaw_rad,
-            e.accel_x_m_s2 + GRAVITY_M_S2 * patch.grade_rad.sin(),
+            accel_x_m_s2,
             c.accelerator_pedal_frac,
             100.0 * p.engine_torque_nm / self.model.parameters().engine.reference_torque_nm,
             p.engine_speed_rad_s * RPM_PER_RAD_S,
@@ -82,7 +83,7 @@ impl Sample<'_> {
             e.steering_wheel_rad,
             e.yaw_rate_rad_s,
             e.trailer.yaw_rate_rad_s,
-            e.accel_y_m_s2,
+            accel_y_m_s2,
             p.fuel_rate_g_s,
             self.coolant_k - ZERO_DEGC_K,
             patch.air_temperature_k - ZERO_DEGC_K,

@@ -2,7 +2,7 @@
 
 use dynamics::lateral::{LateralInputs, LateralModel, LateralState};
 use dynamics::{RoadPatch, SUBSTEP_S, TruckModel, TruckParameters};
-use tractrix_core::Command;
+use tractrix_core::{Command, EgoState};
 
 /// Mean relative difference of two signals.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
@@ -51,4 +51,24 @@ fn a_sine_of_the_wheel_is_answered_as_by_the_lateral_model_alone() {
             assert!(d < 0.01, "payload {payload_kg} kg, signal {i}: {d}");
         }
     }
+}
+
+/// Simulated logs and the brake unit's VDC2 left gravity out on a banked road, where an accelerometer
+/// that is fixed to the body cannot tell it from a turn.
+#[test]
+fn an_accelerometer_measures_gravity_on_a_grade_and_on_a_bank() {
+    let mut truck = TruckParameters::load("reference").unwrap();
+    // The road is steeper and more banked than the map has it.
+    truck.instruments.grade_bias_frac = 0.01;
+    truck.instruments.bank_offset_rad = -0.01;
+    let model = TruckModel::new(truck, 0.0).unwrap();
+    let standing = EgoState::default();
+    let map = RoadPatch { grade_rad: 0.03, bank_rad: 0.05, ..RoadPatch::default() };
+    let [along, across] = model.specific_force_m_s2(&standing, &map);
+    let g = tractrix_core::GRAVITY_M_S2;
+    assert!((along - g * (0.03_f64.tan() + 0.01).atan().sin()).abs() < 1e-9, "{along}");
+    assert!((across - g * 0.04_f64.sin()).abs() < 1e-9, "{across}");
+    let turning = EgoState { accel_x_m_s2: -1.0, accel_y_m_s2: 2.0, ..standing };
+    let moved = model.specific_force_m_s2(&turning, &map);
+    assert!((moved[0] - along + 1.0).abs() < 1e-12 && (moved[1] - across - 2.0).abs() < 1e-12);
 }

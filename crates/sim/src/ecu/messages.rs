@@ -278,14 +278,15 @@ impl Snapshot<'_> {
     }
 
     pub(super) fn vdc2(&self) -> Vdc2 {
+        let [along, across] = self.truck.model().specific_force_m_s2(self.ego, &self.truck.patch());
         let turns = libm::trunc(self.ego.steering_wheel_rad / (2.0 * std::f64::consts::PI));
         Vdc2 {
             steering_wheel_rad: Slot::Value(self.ego.steering_wheel_rad),
             steering_wheel_turns: Slot::Value(turns as i16),
             steering_sensor_type: YES,
             yaw_rate_rad_s: Slot::Value(self.ego.yaw_rate_rad_s),
-            lateral_acceleration_m_s2: Slot::Value(self.ego.accel_y_m_s2),
-            longitudinal_acceleration_m_s2: Slot::Value(self.ego.accel_x_m_s2),
+            lateral_acceleration_m_s2: Slot::Value(across),
+            longitudinal_acceleration_m_s2: Slot::Value(along),
         }
     }
 
