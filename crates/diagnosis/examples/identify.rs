@@ -1,5 +1,7 @@
 //! How often the 90 % intervals of `identify` hold the truth: `identify COUNT SEED [drives=N]
-//! [seconds=S] [misses=1]`. Each draw has a truck file that is off and drives of its own.
+//! [seconds=S] [misses=1]`. Each draw has a truck file that is off and drives of its own. With
+//! `truck=NAME folders=DIR,...` the truck is a built-in one and the drives are those of the folders,
+//! one after the other (`baseline` of `sim-server diagnose --example --truck NAME --seed N`).
 #![allow(
     clippy::unwrap_used,
     clippy::disallowed_macros,
@@ -11,18 +13,19 @@
 mod support;
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use diagnosis::identify::identify;
+use diagnosis::read_drives;
 use shell::Threads;
-use support::nominal::{Off, off};
+use support::nominal::{Off, off, off_built_in};
 use support::{Campaign, generate};
 
 fn main() {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let option = |key: &str, default: u64| {
-        let found = words.iter().find_map(|w| w.strip_prefix(key)?.strip_prefix('='));
-        found.map_or(default, |v| v.parse().unwrap())
-    };
+    let word = |key: &str| words.iter().find_map(|w| w.strip_prefix(key)?.strip_prefix('='));
+    let option = |key: &str, default: u64| word(key).map_or(default, |v| v.parse().unwrap());
+    let built_in = word("truck").zip(word("folders"));
     let [count, seed] = [0, 1].map(|i| words[i].parse::<u64>().unwrap());
     let lists = option("misses", 0) > 0;
     let campaign = Campaign {
@@ -33,9 +36,41 @@ fn main() {
     // told, inside, sum of squared errors over truth, of widths over truth
     let mut table: BTreeMap<String, (u64, u64, f64, f64)> = BTreeMap::new();
     for draw in seed..seed + count {
-        let Off { truck, truth, common } = off(draw);
-        let drives = generate(&common, &campaign, 7000 + draw);
+        let (Off { truck, truth, .. }, drives) = match built_in {
+            Some((name, folders)) => {
+                let folders: Vec<&str> = folders.split(',').collect();
+                let folder = folders[(draw - seed) as usize % folders.len()];
+                (off_built_in(name, draw), read_drives(Path::new(folder)).unwrap())
+            }
+            None => {
+                let off = off(draw);
+                let drives = generate(&off.common, &campaign, 7000 + draw);
+                (off, drives)
+            }
+        };
+        let mut truck = truck;
+        if std::env::var("LIN").is_ok() {
+            truck.lateral.tyres.law = dynamics::lateral::TyreLaw::Linear;
+        }
+        if let Ok(mu) = std::env::var("MU") {
+            truck.lateral.tyres.law =
+                dynamics::lateral::TyreLaw::Saturating { friction_coeff: mu.parse().unwrap() };
+        }
         let found = identify(&truck, &drives, &Threads::available()).unwrap();
+        if std::env::var("WHY").is_ok() {
+            for n in &found.not_told {
+                println!("  {}: {}", n.path, n.why);
+            }
+            for f in &found.figures {
+                println!(
+                    "  {} {} {} [{:.4} {:.4}] truth {}",
+                    f.path, f.nominal, f.value, f.interval_90[0], f.interval_90[1], truth[&f.path]
+                );
+            }
+            for c in &found.correlated {
+                println!("  {:?} {:.2}", c.figures, c.correlation);
+            }
+        }
         for f in &found.figures {
             let (true_value, [low, high]) = (truth[&f.path], f.interval_90);
             let path =

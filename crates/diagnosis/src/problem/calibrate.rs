@@ -6,7 +6,7 @@ use super::nuisance::Changed;
 use super::{Direction, Problem, Reference, nuisance_directions, replay};
 use crate::DiagnosisError;
 use crate::causes::hypothesis::CATALOGUE;
-use crate::causes::param::{PARAMS, SPECS, Theta};
+use crate::causes::param::{P, PARAMS, SPECS, Theta};
 use crate::replay::{MODULES, Prepared, Residuals};
 use crate::search::decisions::{FREE_FORM_NATS, MEAN_PRIOR};
 
@@ -87,7 +87,8 @@ impl Problem<'_> {
             for (j, d) in directions.iter().enumerate() {
                 let s = d.p.spec();
                 let cause = CATALOGUE.iter().any(|h| h.params().any(|p| p == d.p));
-                if s.calibration > 0.0 && s.unit == "s" && !cause {
+                let common = s.unit == "s" || matches!(s.p, P::CurveBank | P::AccelYAhead);
+                if s.calibration > 0.0 && common && !cause {
                     let mean = means.iter().map(|z| z[j]).sum::<f64>() / means.len() as f64;
                     let x = &mut self.reference.theta[d.p as usize];
                     *x = (*x + mean * self.reference.tolerance[d.p as usize]).clamp(s.lo, s.hi);

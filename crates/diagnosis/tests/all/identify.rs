@@ -34,6 +34,41 @@ fn a_truck_file_that_is_off_is_led_back_to_the_truck_and_says_how_well() {
     assert!(again.provenance["engine.full_load_torque_nm"].source.contains("times"));
 }
 
+/// A file whose truck folds at speed came back as what the drives say, with narrow intervals: 40 % too
+/// stiff steer tyres and 27 % too soft drive tyres, give or take 2 %.
+#[test]
+fn a_truck_file_that_folds_at_speed_is_led_back_too() {
+    let mut truck = TruckParameters::load("reference").unwrap();
+    let scales = [1.6, 0.65, 1.0];
+    truck.lateral.tyres.stiffness_scale = scales;
+    let found = identify(&truck, &generate(&[], &SHORT, 63), &Serial).unwrap();
+    for (axle, scale) in scales.iter().enumerate() {
+        let path = format!("lateral.tyres.stiffness_scale[{axle}]");
+        let f = found.figures.iter().find(|f| f.path == path).unwrap();
+        assert_eq!(f.nominal, *scale);
+        assert!((f.value - 1.0).abs() < 3.0 * f.sigma && f.sigma < 0.08, "{f:?}");
+    }
+}
+
+/// A fuel map that just spans the sheet's full load, and drives that ask for a per cent more: every
+/// figure but those of the engine was one "which no truck has".
+#[test]
+fn a_fuel_map_ends_below_the_full_load_that_drives_tell() {
+    let mut truck = TruckParameters::load("reference").unwrap();
+    truck.engine.full_load_torque_nm.iter_mut().for_each(|nm| *nm *= 0.97);
+    let most_nm = truck.engine.full_load_torque_nm.iter().fold(0.0, |a: f64, nm| a.max(*nm));
+    let longhaul = TruckParameters::load("longhaul").unwrap().engine;
+    let mut map = longhaul.fuel_map.unwrap();
+    *map.torque_nm.last_mut().unwrap() = most_nm;
+    assert!(!map.extrapolate);
+    (truck.engine.fuel, truck.engine.fuel_map) = (longhaul.fuel, Some(map));
+    let found = identify(&truck, &generate(&[], &SHORT, 64), &Serial).unwrap();
+    let full_load = found.figures.iter().find(|f| f.path == "engine.full_load_torque_nm").unwrap();
+    assert!(full_load.value > 1.01, "{full_load:?}");
+    assert!(found.figures.iter().any(|f| f.path == "resistance.drag_area_m2"));
+    assert!(found.truck_file("found", "three drives").is_ok());
+}
+
 #[test]
 fn what_no_channel_shows_keeps_its_figure_and_says_which_channels_are_missing() {
     let mut set = generate(&[], &SHORT, 62);

@@ -1,5 +1,5 @@
-//! Truck files of the generator's truck that are off, each figure by what is usually not known of it,
-//! and what the generator's truck really has.
+//! Truck files that are off, each figure by what is usually not known of it, and what the truck really
+//! has: the generator's, or a built-in one.
 
 use std::collections::BTreeMap;
 
@@ -48,11 +48,34 @@ pub(crate) struct Off {
     pub(crate) common: Vec<Effect>,
 }
 
+/// The generator's truck.
 pub(crate) fn off(seed: u64) -> Off {
     let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x0ff);
-    // more than two and a half deviations are no sheet's error
-    let mut n = || normal(&mut rng).clamp(-2.5, 2.5);
-    let mut truck = TruckParameters::load("reference").unwrap();
+    let mut out = off_sheet("reference", &mut rng);
+    for (id, sigma) in COMMON {
+        let size = sigma * drawn(&mut rng);
+        out.common.push(Effect::Cause { id, size, shape: Shape([0.0; 4]) });
+        if let "mass" | "speed_scale" = id {
+            let path = format!("instruments.{id}_coeff").replace("mass_", "mass_scale_");
+            out.truth.insert(path, 1.0 + size);
+        }
+    }
+    out
+}
+
+/// A built-in truck whose drives the truck model made: nothing else is off.
+pub(crate) fn off_built_in(truck: &str, seed: u64) -> Off {
+    off_sheet(truck, &mut ChaCha8Rng::seed_from_u64(seed ^ 0x0ff))
+}
+
+/// More than two and a half deviations are no sheet's error.
+fn drawn(rng: &mut ChaCha8Rng) -> f64 {
+    normal(rng).clamp(-2.5, 2.5)
+}
+
+fn off_sheet(name: &str, rng: &mut ChaCha8Rng) -> Off {
+    let mut n = || drawn(rng);
+    let mut truck = TruckParameters::load(name).unwrap();
     let mut truth = BTreeMap::new();
     for (path, sigma, relative) in OFF {
         let true_value = truck.parameter(path).unwrap();
@@ -69,7 +92,14 @@ pub(crate) fn off(seed: u64) -> Off {
     for figure in [&mut f.constant_g_s, &mut f.per_rpm_g_s, &mut f.per_kw_g_s] {
         *figure = figure.map(|x| x * fuel);
     }
-    truth.insert("engine.fuel.per_kw_g_s".to_owned(), 1.0 / fuel);
+    if let Some(map) = &mut truck.engine.fuel_map {
+        let rows = map.fuel_g_s.iter_mut().chain(&mut map.bsfc_g_kwh).flatten().flatten();
+        rows.chain(map.zero_torque_g_s.iter_mut().flatten()).for_each(|x| *x *= fuel);
+        map.extrapolate = true;
+    }
+    for path in ["engine.fuel.per_kw_g_s", "engine.fuel_map.fuel_g_s"] {
+        truth.insert(path.to_owned(), 1.0 / fuel);
+    }
     truth.insert("driveline.wheel_radius_m".to_owned(), truck.driveline.wheel_radius_m);
     truck.driveline.wheel_radius_m *= 1.0 + RADIUS_FRAC * n();
     let ratios = truck.driveline.gear_ratios.iter_mut().enumerate();
@@ -77,17 +107,9 @@ pub(crate) fn off(seed: u64) -> Off {
         truth.insert(format!("driveline.gear_ratios[{i}]"), *ratio);
         *ratio *= 1.0 + RATIO_FRAC * n();
     }
-    let mut common = Vec::new();
-    for (id, sigma) in COMMON {
-        let size = sigma * n();
-        common.push(Effect::Cause { id, size, shape: Shape([0.0; 4]) });
-        if let "mass" | "speed_scale" = id {
-            truth.insert(
-                format!("instruments.{id}_coeff").replace("mass_", "mass_scale_"),
-                1.0 + size,
-            );
-        }
+    for path in ["instruments.mass_scale_coeff", "instruments.speed_scale_coeff"] {
+        truth.insert(path.to_owned(), truck.parameter(path).unwrap());
     }
     truth.insert("lateral.steering.offset_rad".to_owned(), 0.0);
-    Off { truck, truth, common }
+    Off { truck, truth, common: Vec::new() }
 }

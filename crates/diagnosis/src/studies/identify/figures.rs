@@ -197,6 +197,11 @@ impl Standing {
         if let Some(demand) = of(P::TorqueReport) {
             e.full_load_torque_nm.iter_mut().for_each(|nm| *nm *= torque * demand);
             self.full_load *= torque * demand;
+            // a map that just spans what the sheet says ends below
+            let most_nm = e.full_load_torque_nm.iter().fold(0.0, |a: f64, nm| a.max(*nm));
+            if let Some(map) = &mut e.fuel_map {
+                map.extrapolate |= map.torque_nm.last().is_some_and(|last_nm| *last_nm < most_nm);
+            }
         }
         if let Some(level) = of(P::FuelScale) {
             let factor = level / torque;
