@@ -4,8 +4,9 @@
 //! With them what the same forces do by the angles between the bodies and of the road wheels.
 //!
 //! A tractor with one drive axle climbs with 1 to 7 % less of it, and without that a payload lay
-//! elsewhere (143 nats) or drive tyres were soft (71) beside a hidden drag or mass. Left out: the
-//! retarder's force, which a cause may change.
+//! elsewhere (143 nats) or drive tyres were soft (71) beside a hidden drag or mass.
+
+use std::sync::Arc;
 
 use dynamics::TruckParameters;
 use dynamics::lateral::{AXLES, GROUP_AXLES, LoadedAxle, YawSideslip};
@@ -14,6 +15,7 @@ use super::force::Longitudinal;
 use super::inputs::BLOCK;
 use super::lateral::{BySpeed, State, plus};
 use super::prepared::Prepared;
+use super::retarder::retarder_n;
 use crate::causes::param::PARAMS;
 use crate::{Drive, Plant};
 
@@ -83,6 +85,8 @@ impl Acting {
 pub(super) struct Grip<'a> {
     model: &'a YawSideslip,
     along: &'a [Along],
+    /// Force of the retarder, N, at the cause's own size.
+    retarder_n: Option<Arc<[f64]>>,
     system: &'a BySpeed,
     axles: [LoadedAxle; AXLES],
     /// Loads of the groups, N.
@@ -92,9 +96,11 @@ pub(super) struct Grip<'a> {
 }
 
 impl<'a> Grip<'a> {
-    /// `None` where tyres do not saturate.
+    /// `None` where tyres do not saturate; with a retarder of `extra_nm` more per stage.
     pub(super) fn new(
         d: &'a Prepared,
+        plant: &Plant,
+        extra_nm: f64,
         model: &'a YawSideslip,
         system: &'a BySpeed,
     ) -> Option<Self> {
@@ -108,6 +114,7 @@ impl<'a> Grip<'a> {
         (!d.along.is_empty()).then(|| Self {
             model,
             along: &d.along,
+            retarder_n: retarder_n(d, plant, extra_nm),
             system,
             axles: core::array::from_fn(|j| model.law.under_load(c[j], load_n[j], 0.0)),
             load_n: GROUP_AXLES.map(|axles| load_n[axles].iter().sum()),
@@ -122,7 +129,8 @@ impl<'a> Grip<'a> {
         let slip = model.slip_rad(v, s, angle);
         let per_load = along.service_n / self.load_n.iter().sum::<f64>();
         let [steer_n, braked_n, trailer_n] = self.load_n.map(|load_n| -per_load * load_n);
-        let along_n = [steer_n, along.drive_n + braked_n, trailer_n];
+        let retarder_n = self.retarder_n.as_ref().map_or(0.0, |n| n[i.min(n.len() - 1)]);
+        let along_n = [steer_n, along.drive_n + braked_n - retarder_n, trailer_n];
         let mut tyres = [[0.0; 4]; 4];
         let mut front = 1.0;
         for (g, group) in self.groups.iter().enumerate() {
@@ -153,8 +161,8 @@ mod tests {
     use super::*;
     use crate::Channel as C;
 
-    /// A truck that climbs, coasts and brakes in curves of up to 3 m/s² is replayed as the truck model
-    /// drives it; tyres of their stiffness alone are off 20 times as much.
+    /// A truck that climbs, coasts and brakes, by its retarder too, in curves of up to 3 m/s² is replayed
+    /// as the truck model drives it; tyres of their stiffness alone are off 20 times as much.
     #[test]
     fn tyres_that_drive_brake_and_slip_are_replayed_as_they_are_simulated() {
         let truck = TruckParameters::load("vecto-40t").unwrap();
@@ -176,10 +184,12 @@ mod tests {
         set(C::EngineSpeedRpm, &|i| per_speed * speed(i));
         set(C::EngineTorquePercent, &|i| if wave(i, 40.0) > 0.0 { 80.0 } else { 0.0 });
         set(C::BrakePressureKpa, &|i| if wave(i, 40.0) < -0.5 { 150.0 } else { 0.0 });
+        set(C::EngineBrakeFrac, &|i| if wave(i, 40.0) < -0.2 { 0.6 } else { 0.0 });
         set(C::GradeFrac, &|_| 0.03);
         set(C::SteeringWheelRad, &wheel);
         let d = Prepared::new(&drive, &plant);
         let balance = Longitudinal::new(&d, &plant, &[0.0; PARAMS]);
+        let retarder_n = retarder_n(&d, &plant, 0.0).unwrap();
         let loaded = loaded(&d, &plant, &[0.0; PARAMS]);
         let model = LateralModel::new(&loaded).unwrap();
         let load_n = loaded.static_axle_load_n();
@@ -190,7 +200,8 @@ mod tests {
             let [drive_n] = balance.drive_n::<1>(i);
             let [service_n] = balance.service_n::<1>(i);
             let along_n = core::array::from_fn(|j| {
-                let drives = if GROUP_AXLES[1].contains(&j) { 0.5 * drive_n } else { 0.0 };
+                let pulls = 0.5 * (drive_n - retarder_n[i]);
+                let drives = if GROUP_AXLES[1].contains(&j) { pulls } else { 0.0 };
                 drives - service_n * load_n[j] / total_n
             });
             let last = i.min(n - 2);

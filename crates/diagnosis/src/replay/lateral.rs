@@ -122,7 +122,7 @@ pub(super) fn residuals(d: &Prepared, plant: &Plant, t: &Theta) -> [Vec<f64>; 3]
         *c *= 1.0 + scale[[0, 1, 1, 2, 2, 2][axle]];
     }
     let system = BySpeed::new(&model);
-    let grip = Grip::new(d, &model, &system);
+    let grip = Grip::new(d, plant, t[P::RetarderStage as usize], &model, &system);
     let mut road_wheel = RoadWheel::new(d, plant, t);
     // A bank pulls on both bodies, and the wind pushes them in a fixed proportion.
     let bank = system.tractor.map(|b| -model.tractor_mass_kg * b);

@@ -195,7 +195,6 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::Fade
         | P::FadeStart
         | P::LiningLag
-        | P::RetarderStage
         | P::RetarderBrake
         | P::RetarderCoast
         | P::RetarderFrom
@@ -209,7 +208,7 @@ pub(crate) fn affects(p: P) -> &'static [Group] {
         | P::StageLag
         | P::FanBand
         | P::FanWidth => &[G::Force],
-        P::WindX | P::WindY | P::Crosswind => &[G::Force, G::Lateral],
+        P::WindX | P::WindY | P::Crosswind | P::RetarderStage => &[G::Force, G::Lateral],
         P::Mass => &[G::Force, G::Lateral],
         P::GradeBias | P::MapShift => &[G::Force, G::Altitude, G::Imu],
         P::Altitude
