@@ -121,6 +121,5 @@ fn sentences(found: &Identification, file: &str) -> String {
 
 /// Five digits.
 fn digits(x: f64) -> String {
-    let text = format!("{x:.4e}");
-    text.parse::<f64>().map_or(text, |x| x.to_string())
+    super::digits(x, 5)
 }

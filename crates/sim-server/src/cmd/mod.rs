@@ -24,6 +24,12 @@ use clap::Parser;
 use crate::cli::{Cli, Command};
 use crate::failure::Failure;
 
+/// A number with this many significant digits, without zeros behind them.
+fn digits(x: f64, significant: usize) -> String {
+    let text = format!("{x:.*e}", significant.saturating_sub(1));
+    text.parse::<f64>().map_or(text, |x| x.to_string())
+}
+
 /// Runs the command that was asked for.
 pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
     match cli.command {
@@ -46,5 +52,20 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
         Some(Command::Truck(command)) => truck::run(&command),
         Some(Command::Scenario(command)) => scenario::run(&command),
         Some(Command::Serve(args)) => serve::run(&args),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::digits;
+
+    /// An error of the yaw rate fell "from 0.001 to 0.001".
+    #[test]
+    fn numbers_have_significant_digits_whatever_their_unit() {
+        assert_eq!(digits(0.001_063_4, 3), "0.00106");
+        assert_eq!(digits(0.387, 3), "0.387");
+        assert_eq!(digits(1_234.5, 3), "1230");
+        assert_eq!(digits(0.0, 3), "0");
+        assert_eq!(digits(f64::NAN, 3), "NaN");
     }
 }

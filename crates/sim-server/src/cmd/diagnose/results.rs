@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::example::{ClosedLoop, Hidden};
 use super::report;
+use crate::cmd::digits;
 use crate::failure::Failure;
 use crate::out_folder::OutFolder;
 use crate::provenance::Provenance;
@@ -92,15 +93,15 @@ impl Results {
             }
             for e in claimed {
                 lines.push(format!(
-                "  {} on {held_out}: error {:.3} to {:.3} ({}), {:.0} % less ({:.0} to {:.0} %)",
-                e.title,
-                e.before,
-                e.after,
-                e.quantity,
-                100.0 * e.fall_frac,
-                100.0 * e.fall_frac_interval[0],
-                100.0 * e.fall_frac_interval[1],
-            ));
+                    "  {} on {held_out}: error {} to {} ({}), {:.0} % less ({:.0} to {:.0} %)",
+                    e.title,
+                    digits(e.before, 3),
+                    digits(e.after, 3),
+                    e.quantity,
+                    100.0 * e.fall_frac,
+                    100.0 * e.fall_frac_interval[0],
+                    100.0 * e.fall_frac_interval[1],
+                ));
             }
         }
         for n in &extension.not_carried {
