@@ -43,9 +43,6 @@ pub struct LateralConfig {
     pub delay_s: f64,
     /// Largest rate of the road-wheel angle, rad/s.
     pub road_wheel_rate_rad_s: f64,
-    /// Largest lateral jerk, m/s³, of the turn that the hand wheel asks for: 5 as UN Regulation 79
-    /// (5.6.2.1.3) and ISO 11270 allow lane keeping systems.
-    pub jerk_m_s3: f64,
 }
 
 impl Default for LateralConfig {
@@ -57,7 +54,6 @@ impl Default for LateralConfig {
             road_wheel_rad: 0.02,
             delay_s: 0.0,
             road_wheel_rate_rad_s: 0.4,
-            jerk_m_s3: 5.0,
         }
     }
 }
@@ -73,8 +69,7 @@ impl LateralConfig {
         config_in("lateral.heading_rad", self.heading_rad, 0.001, 1e6)?;
         config_in("lateral.road_wheel_rad", self.road_wheel_rad, 0.001, 1.0)?;
         config_in("lateral.delay_s", self.delay_s, 0.0, 0.5)?;
-        config_in("lateral.road_wheel_rate_rad_s", self.road_wheel_rate_rad_s, 0.02, 5.0)?;
-        config_in("lateral.jerk_m_s3", self.jerk_m_s3, 0.5, 1e3)
+        config_in("lateral.road_wheel_rate_rad_s", self.road_wheel_rate_rad_s, 0.02, 5.0)
     }
 }
 
@@ -176,12 +171,7 @@ impl LateralController {
                 .sum();
             p.model.u_steady * kappa - feedback + ahead
         });
-        // A truck that oversteers needs its counter steering at the rate of one that does neither.
-        let wheel_per_curvature_m =
-            self.blend_scalar(&weights, |p| p.model.u_steady).max(limits.geometry.wheelbase_m);
-        let square = (ego.speed_m_s * ego.speed_m_s).max(1.0);
-        let comfort_rad_s = self.config.jerk_m_s3 * wheel_per_curvature_m / square;
-        let step = self.config.road_wheel_rate_rad_s.min(comfort_rad_s) * self.dt_s;
+        let step = self.config.road_wheel_rate_rad_s * self.dt_s;
         let limit = limits.lateral.max_road_wheel_rad;
         let command =
             command.clamp(self.last_rad - step, self.last_rad + step).clamp(-limit, limit);

@@ -16,14 +16,11 @@ fn external() -> StackConfig {
     StackConfig { decider: DeciderKind::External, ..StackConfig::default() }
 }
 
-#[derive(Default)]
 struct Errors {
     tractor_m: f64,
     trailer_m: f64,
     lateral_accel_m_s2: f64,
     duration_s: f64,
-    /// Fastest turn of the hand wheel, rad/s.
-    wheel_rad_s: f64,
 }
 
 /// Drives one change to the left at 20 m/s with the given misfit between truck and data sheet.
@@ -33,7 +30,8 @@ fn one_change(road: &Road, misfit: Misfit) -> Errors {
     plant.misfit = misfit;
     let mut stack = Stack::new(external(), &reference_limits()).unwrap();
     let mut traffic = no_traffic();
-    let (mut out, mut wheel_rad) = (Errors::default(), 0.0);
+    let mut out =
+        Errors { tractor_m: 0.0, trailer_m: 0.0, lateral_accel_m_s2: 0.0, duration_s: 0.0 };
     let left = road.left_of(0, 200.0).unwrap();
     for i in 0..3000 {
         if i == 500 {
@@ -43,14 +41,10 @@ fn one_change(road: &Road, misfit: Misfit) -> Errors {
         let plan = stack.plan();
         assert!(plan.guard.is_empty(), "guard at {i}: {:?}", plan.guard);
         if i < 500 {
-            wheel_rad = plan.command.steering_wheel_rad;
             continue;
         }
-        let turned_rad = f64::abs(plan.command.steering_wheel_rad - wheel_rad);
-        out.wheel_rad_s = out.wheel_rad_s.max(turned_rad / 0.01);
         out.tractor_m = out.tractor_m.max(plan.lateral_error_m.abs());
         out.lateral_accel_m_s2 = out.lateral_accel_m_s2.max(plant.ego.accel_y_m_s2.abs());
-        wheel_rad = plan.command.steering_wheel_rad;
         if plan.maneuver == Maneuver::ChangeLeft {
             out.duration_s += 0.01;
         }
@@ -94,15 +88,6 @@ fn a_lane_change_at_72_km_h_with_55_t_keeps_to_its_path() {
     assert!(e.trailer_m < 0.20, "trailer {}", e.trailer_m);
     assert!(e.lateral_accel_m_s2 < 0.9, "{} m/s2", e.lateral_accel_m_s2);
     assert!((6.0..10.0).contains(&e.duration_s), "{} s", e.duration_s);
-}
-
-/// A change began with 8 degrees of the hand wheel within 0.02 s, which no driver does and no logger
-/// sees the time of. 5 m/s³ of lateral jerk are 1.9 rad/s of this truck's wheel at 20 m/s.
-#[test]
-fn a_lane_change_does_not_begin_with_a_jerk_of_the_hand_wheel() {
-    let found =
-        one_change(&builtin::flat(5_000.0), Misfit { mass_factor: 1.0, stiffness_factor: 1.0 });
-    assert!((0.5..2.5).contains(&found.wheel_rad_s), "{} rad/s", found.wheel_rad_s);
 }
 
 #[test]
