@@ -48,29 +48,7 @@ fn main() {
                 (off, drives)
             }
         };
-        let mut truck = truck;
-        if std::env::var("LIN").is_ok() {
-            truck.lateral.tyres.law = dynamics::lateral::TyreLaw::Linear;
-        }
-        if let Ok(mu) = std::env::var("MU") {
-            truck.lateral.tyres.law =
-                dynamics::lateral::TyreLaw::Saturating { friction_coeff: mu.parse().unwrap() };
-        }
         let found = identify(&truck, &drives, &Threads::available()).unwrap();
-        if std::env::var("WHY").is_ok() {
-            for n in &found.not_told {
-                println!("  {}: {}", n.path, n.why);
-            }
-            for f in &found.figures {
-                println!(
-                    "  {} {} {} [{:.4} {:.4}] truth {}",
-                    f.path, f.nominal, f.value, f.interval_90[0], f.interval_90[1], truth[&f.path]
-                );
-            }
-            for c in &found.correlated {
-                println!("  {:?} {:.2}", c.figures, c.correlation);
-            }
-        }
         for f in &found.figures {
             let (true_value, [low, high]) = (truth[&f.path], f.interval_90);
             let path =
