@@ -77,7 +77,8 @@ impl Problem<'_> {
     }
 
     /// What drives that need not be in order teach all the same, because no cause can be it: when
-    /// the logger writes its channels. Their lags are not linear over a sample, so that tolerances
+    /// the logger writes its channels, how curves are banked, where the accelerometer sits; not the
+    /// fuel's level, which causes of the fuel are weighed against. Their lags are not linear over a sample, so that tolerances
     /// must be about where they are: a lag of a sample that was left to a tolerance was an effect
     /// outside the catalogue at every released pedal.
     pub(super) fn recentre(&mut self) -> Result<(), DiagnosisError> {
@@ -87,8 +88,7 @@ impl Problem<'_> {
             for (j, d) in directions.iter().enumerate() {
                 let s = d.p.spec();
                 let cause = CATALOGUE.iter().any(|h| h.params().any(|p| p == d.p));
-                let common = s.unit == "s" || matches!(s.p, P::CurveBank | P::AccelYAhead);
-                if s.calibration > 0.0 && common && !cause {
+                if s.calibration > 0.0 && s.p != P::FuelScale && !cause {
                     let mean = means.iter().map(|z| z[j]).sum::<f64>() / means.len() as f64;
                     let x = &mut self.reference.theta[d.p as usize];
                     *x = (*x + mean * self.reference.tolerance[d.p as usize]).clamp(s.lo, s.hi);

@@ -88,13 +88,8 @@ fn off_sheet(name: &str, rng: &mut ChaCha8Rng) -> Off {
     truck.engine.full_load_torque_nm.iter_mut().for_each(|x| *x *= full_load);
     truth.insert("engine.full_load_torque_nm".to_owned(), 1.0 / full_load);
     let fuel = 1.0 + FUEL_FRAC * n();
-    let f = &mut truck.engine.fuel;
-    for figure in [&mut f.constant_g_s, &mut f.per_rpm_g_s, &mut f.per_kw_g_s] {
-        *figure = figure.map(|x| x * fuel);
-    }
+    truck.engine.scale_fuel(fuel);
     if let Some(map) = &mut truck.engine.fuel_map {
-        let rows = map.fuel_g_s.iter_mut().chain(&mut map.bsfc_g_kwh).flatten().flatten();
-        rows.chain(map.zero_torque_g_s.iter_mut().flatten()).for_each(|x| *x *= fuel);
         map.extrapolate = true;
     }
     for path in ["engine.fuel.per_kw_g_s", "engine.fuel_map.fuel_g_s"] {

@@ -197,13 +197,31 @@ impl EngineParameters {
         let range = Range {
             idle_rpm: self.idle_speed_rpm,
             max_rpm: self.max_speed_rpm,
-            full_load_nm: self.full_load_torque_nm.iter().copied().fold(0.0, f64::max),
+            full_load_nm: self.peak_torque_nm(),
         };
         self.fuel.check(self.fuel_map.as_ref(), range, &mut b);
         if let Some(map) = &self.pedal_map {
             b.result("pedal_map", map.grid().map(|_| ()));
         }
         b.violations
+    }
+
+    /// Highest full-load torque, Nm.
+    #[must_use]
+    pub fn peak_torque_nm(&self) -> f64 {
+        self.full_load_torque_nm.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Multiplies the fuel flow everywhere, on the map or on the Willans line.
+    pub fn scale_fuel(&mut self, factor: f64) {
+        if let Some(map) = &mut self.fuel_map {
+            let rows = map.fuel_g_s.iter_mut().chain(&mut map.bsfc_g_kwh).flatten().flatten();
+            rows.chain(map.zero_torque_g_s.iter_mut().flatten()).for_each(|x| *x *= factor);
+        }
+        let fuel = &mut self.fuel;
+        for part in [&mut fuel.constant_g_s, &mut fuel.per_rpm_g_s, &mut fuel.per_kw_g_s] {
+            *part = part.map(|x| x * factor);
+        }
     }
 }
 

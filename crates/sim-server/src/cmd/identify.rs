@@ -8,7 +8,7 @@ use diagnosis::identify::{Correlated, Identification, Identified, NotTold, ident
 use dynamics::TruckParameters;
 use serde::Serialize;
 
-use super::diagnose;
+use super::{diagnose, rounded};
 use crate::failure::Failure;
 use crate::out_folder::Out;
 use crate::output;
@@ -16,6 +16,8 @@ use crate::progress::Stages;
 use crate::provenance::{GIT_REVISION, Provenance, VERSION};
 use shell::Threads;
 
+/// Significant digits of a printed figure.
+const DIGITS: usize = 5;
 /// What is written, beside drives that are made.
 const RESULTS: &[&str] = &["identify.json", "*.identified.toml"];
 
@@ -100,10 +102,10 @@ fn sentences(found: &Identification, file: &str) -> String {
         let path = format!("{}{factor}", f.path);
         lines.push(format!(
             "  {path:<44} {:>10} {:>10} {:>10} to {}",
-            digits(f.nominal),
-            digits(f.value),
-            digits(low),
-            digits(high)
+            rounded(f.nominal, DIGITS),
+            rounded(f.value, DIGITS),
+            rounded(low, DIGITS),
+            rounded(high, DIGITS)
         ));
     }
     if !found.not_told.is_empty() {
@@ -117,9 +119,4 @@ fn sentences(found: &Identification, file: &str) -> String {
     lines.extend(super::diagnose::defects(&found.findings));
     lines.push(format!("Truck file: {file}"));
     lines.join("\n")
-}
-
-/// Five digits.
-fn digits(x: f64) -> String {
-    super::digits(x, 5)
 }

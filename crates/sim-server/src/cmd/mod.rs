@@ -24,10 +24,9 @@ use clap::Parser;
 use crate::cli::{Cli, Command};
 use crate::failure::Failure;
 
-/// A number with this many significant digits, without zeros behind them.
-fn digits(x: f64, significant: usize) -> String {
-    let text = format!("{x:.*e}", significant.saturating_sub(1));
-    text.parse::<f64>().map_or(text, |x| x.to_string())
+/// A number to this many significant digits.
+fn rounded(x: f64, digits: usize) -> f64 {
+    format!("{x:.*e}", digits.saturating_sub(1)).parse().unwrap_or(x)
 }
 
 /// Runs the command that was asked for.
@@ -57,15 +56,19 @@ pub(crate) fn dispatch(cli: Cli) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::digits;
+    use super::rounded;
 
     /// An error of the yaw rate fell "from 0.001 to 0.001".
     #[test]
     fn numbers_have_significant_digits_whatever_their_unit() {
-        assert_eq!(digits(0.001_063_4, 3), "0.00106");
-        assert_eq!(digits(0.387, 3), "0.387");
-        assert_eq!(digits(1_234.5, 3), "1230");
-        assert_eq!(digits(0.0, 3), "0");
-        assert_eq!(digits(f64::NAN, 3), "NaN");
+        for (x, printed) in [
+            (0.001_063_4, "0.00106"),
+            (0.387, "0.387"),
+            (-1_234.5, "-1230"),
+            (0.0, "0"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(rounded(x, 3).to_string(), printed);
+        }
     }
 }

@@ -20,6 +20,7 @@ mod batch;
 mod braking_margin;
 mod hot_retarder;
 mod jam;
+mod main_job;
 mod promised_fuel;
 mod rollout_decider;
 mod words;

@@ -198,20 +198,14 @@ impl Standing {
             e.full_load_torque_nm.iter_mut().for_each(|nm| *nm *= torque * demand);
             self.full_load *= torque * demand;
             // a map that just spans what the sheet says ends below
-            let most_nm = e.full_load_torque_nm.iter().fold(0.0, |a: f64, nm| a.max(*nm));
+            let peak_nm = e.peak_torque_nm();
             if let Some(map) = &mut e.fuel_map {
-                map.extrapolate |= map.torque_nm.last().is_some_and(|last_nm| *last_nm < most_nm);
+                map.extrapolate |= map.torque_nm.last().is_some_and(|last_nm| *last_nm < peak_nm);
             }
         }
         if let Some(level) = of(P::FuelScale) {
             let factor = level / torque;
-            let map = e.fuel_map.iter_mut();
-            map.for_each(|map| {
-                let rows = map.fuel_g_s.iter_mut().chain(&mut map.bsfc_g_kwh).flatten().flatten();
-                rows.chain(map.zero_torque_g_s.iter_mut().flatten()).for_each(|x| *x *= factor);
-            });
-            let line = [&mut e.fuel.constant_g_s, &mut e.fuel.per_rpm_g_s, &mut e.fuel.per_kw_g_s];
-            line.into_iter().for_each(|x| *x = x.map(|x| x * factor));
+            e.scale_fuel(factor);
             self.fuel *= factor;
         }
     }

@@ -10,8 +10,8 @@
 //! `M`: noise and tolerances (see `problem`); `m`, `s`: the truck file's figure and how well it is
 //! known, from its `[provenance]` or else from the catalogue of causes. The truck is moved to the fit
 //! and the noise is learned anew until nothing moves: noise learned beside a wrong truck is too large.
-//! A figure whose interval the drives hardly narrow stays as it is and says why. A truck that folds at
-//! the driven speeds is led to one that does not first ([`start`]).
+//! A figure whose interval the drives hardly narrow stays as it is and says why. A truck that is
+//! unstable at the driven speeds is led to a stable one first ([`start`]).
 //!
 //! Coast-downs come first ([`coast_down`]): what they say of the road load is what the other drives
 //! begin with. Columns that a log lacks and others say are worked out ([`columns`]).
@@ -164,7 +164,7 @@ pub fn identify(
     crate::data::plausible::check_length(&drives)?;
     let ratios = ratios::identify(&start, &drives)?;
     let mut standing = Standing::new(ratios.truck);
-    start::steady(&mut standing, &drives.drives)?;
+    start::stable(&mut standing, &drives.drives)?;
     let mut round = 0;
     let told = loop {
         let plant = Plant::of_truck(&standing.truck)?;

@@ -1,9 +1,9 @@
-//! Where the fit begins: at a truck file that the drives' own motion does not tear apart.
+//! Where the fit begins: at a truck that is stable at the driven speeds.
 //!
-//! A truck file with stiff steer tyres and soft drive tyres describes a truck that is unstable above
-//! some speed (Ellis, Vehicle Handling Dynamics, 3.3). Replayed there its yaw rate is a fold that says
-//! nothing of the truck: noise learned beside it is large, no step from it leads anywhere, and the file
-//! would come back as what the drives say, with narrow intervals.
+//! A truck file with stiff steer tyres and soft drive tyres oversteers and has a critical speed (ISO
+//! 8855). Replayed above it the truck spins, whatever was measured: noise learned beside it is large, no
+//! step from it leads anywhere, and the file would come back as what the drives say, with narrow
+//! intervals.
 
 use crate::causes::param::{P, PARAMS};
 use crate::replay::{Group, Module as M, Prepared, Residuals, replay_group};
@@ -13,20 +13,20 @@ use super::DiagnosisError;
 use super::figures::{FIGURES, Figure, Standing};
 
 /// Part by which steer tyres are softer and drive tyres stiffer, step by step, and steps at most.
-const SOFTER_FRAC: f64 = 0.1;
+const STEP_FRAC: f64 = 0.1;
 const STEPS: usize = 12;
 
 /// Moves stiffnesses until no drive is replayed worse than by a truck that does not turn.
 ///
 /// # Errors
 /// A truck that nothing makes of.
-pub(super) fn steady(standing: &mut Standing, drives: &[Drive]) -> Result<(), DiagnosisError> {
+pub(super) fn stable(standing: &mut Standing, drives: &[Drive]) -> Result<(), DiagnosisError> {
     let of = |p: P, by: f64| FIGURES.iter().find(|f| f.p == p).map(|f| (f, by));
     let step: Vec<(&Figure, f64)> =
-        [of(P::CFront, -SOFTER_FRAC), of(P::CDrive, SOFTER_FRAC)].into_iter().flatten().collect();
+        [of(P::CFront, -STEP_FRAC), of(P::CDrive, STEP_FRAC)].into_iter().flatten().collect();
     for _ in 0..STEPS {
         let plant = Plant::of_truck(&standing.truck)?;
-        if !drives.iter().any(|d| is_adrift(&Prepared::new(d, &plant), &plant)) {
+        if !drives.iter().any(|d| explains_nothing(&Prepared::new(d, &plant), &plant)) {
             break;
         }
         standing.apply(&step);
@@ -35,7 +35,7 @@ pub(super) fn steady(standing: &mut Standing, drives: &[Drive]) -> Result<(), Di
 }
 
 /// Whether the replay is farther from the measured yaw rate than one of a truck that does not turn.
-fn is_adrift(d: &Prepared, plant: &Plant) -> bool {
+fn explains_nothing(d: &Prepared, plant: &Plant) -> bool {
     let mut out = Residuals::default();
     replay_group(d, plant, &[0.0; PARAMS], Group::Lateral, &mut out);
     let rows =

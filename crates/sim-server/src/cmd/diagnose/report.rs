@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::picture::plotly_js;
 
 /// Significant digits of the figures in the page; the full ones are in `diagnosis.json`.
-const DIGITS: i32 = 5;
+const DIGITS: usize = 5;
 
 /// The page. `diagnosis_json` is what `diagnosis.json` holds, `drives` names where the drives came
 /// from, `overlay` is the text of the extended truck file, `example` what was hidden and the trip that
@@ -44,16 +44,7 @@ pub(super) fn page(
 fn rounded(value: Value) -> Value {
     match value {
         Value::Number(n) if n.is_f64() => {
-            n.as_f64().filter(|x| *x != 0.0).map_or(Value::Number(n), |x| {
-                let unit = 10_f64.powi(x.abs().log10().floor() as i32 + 1 - DIGITS);
-                // dividing by a power of ten keeps the printed number short
-                let short = if unit < 1.0 {
-                    (x / unit).round() / (1.0 / unit).round()
-                } else {
-                    (x / unit).round() * unit
-                };
-                short.into()
-            })
+            n.as_f64().map_or(Value::Number(n), |x| crate::cmd::rounded(x, DIGITS).into())
         }
         Value::Array(values) => values.into_iter().map(rounded).collect(),
         Value::Object(map) => map.into_iter().map(|(k, v)| (k, rounded(v))).collect(),

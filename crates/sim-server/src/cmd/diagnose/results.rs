@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::example::{ClosedLoop, Hidden};
 use super::report;
-use crate::cmd::digits;
+use crate::cmd::rounded;
 use crate::failure::Failure;
 use crate::out_folder::OutFolder;
 use crate::provenance::Provenance;
@@ -95,8 +95,8 @@ impl Results {
                 lines.push(format!(
                     "  {} on {held_out}: error {} to {} ({}), {:.0} % less ({:.0} to {:.0} %)",
                     e.title,
-                    digits(e.before, 3),
-                    digits(e.after, 3),
+                    rounded(e.before, 3),
+                    rounded(e.after, 3),
                     e.quantity,
                     100.0 * e.fall_frac,
                     100.0 * e.fall_frac_interval[0],
