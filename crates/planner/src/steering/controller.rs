@@ -7,6 +7,10 @@
 //! `u = u_s(kappa_k) - K z - sum_j (r + B'PB)^-1 B' (A - BK)'^j P w_{k+j}`.
 //! A delay of `n` steps is met exactly by predicting `x` over the `n` commands still on their way.
 //!
+//! What comes of the preview turns the wheel no faster than [`PREVIEWED_JERK_M_S3`] allows: a path
+//! that has just been planned would have been steered for before, and the sum above jumps where it
+//! appears. The feedback is free of that bound.
+//!
 //! Left out: tyre saturation (the path planner's limits keep the truck in the linear range) and
 //! estimation of side slip; the truck reports its lateral speed.
 
@@ -23,6 +27,10 @@ use tractrix_core::{EgoState, Geometry, LateralLimits, VehicleLimits};
 pub(crate) const PREVIEW_POINTS: usize = 26;
 /// Spacing of the preview, s.
 pub(crate) const PREVIEW_STEP_S: f64 = 0.1;
+
+/// Lateral jerk of a steady curve that the previewed part of the command may ask for, m/s^3 (UN
+/// Regulation 79, 5.6.2.1.3: the bound of an automatically commanded steering function).
+const PREVIEWED_JERK_M_S3: f64 = 5.0;
 
 const SPEEDS_M_S: [f64; 10] = [3.0, 5.0, 7.5, 10.0, 12.5, 15.0, 18.0, 22.0, 26.0, 30.0];
 const TRAILER_MASS_FACTORS: [f64; 3] = [0.25, 0.6, 1.2];
@@ -101,6 +109,8 @@ pub(crate) struct LateralController {
     /// Commands that have not yet reached the wheels, oldest first.
     pending_rad: VecDeque<f64>,
     last_rad: f64,
+    /// The previewed part of the last command.
+    last_previewed_rad: f64,
 }
 
 impl LateralController {
@@ -132,6 +142,7 @@ impl LateralController {
             design_mass_kg,
             pending_rad: core::iter::repeat_n(0.0, steps).collect(),
             last_rad: 0.0,
+            last_previewed_rad: 0.0,
         })
     }
 
@@ -161,17 +172,13 @@ impl LateralController {
                 .blend(&weights, |p| p.model.a * x + p.model.b * u + p.model.e * curvature_1_m[0]);
         }
         let kappa = curvature_1_m[0];
-        let command = self.blend_scalar(&weights, |p| {
-            let feedback = p.gain.dot(&(x - p.model.x_steady * kappa));
-            let ahead: f64 = p
-                .preview
-                .iter()
-                .zip(curvature_1_m.windows(2))
-                .map(|(gain, k)| gain * (k[1] - k[0]))
-                .sum();
-            p.model.u_steady * kappa - feedback + ahead
+        let steady_and_feedback = self.blend_scalar(&weights, |p| {
+            p.model.u_steady * kappa - p.gain.dot(&(x - p.model.x_steady * kappa))
         });
         let step = self.config.road_wheel_rate_rad_s * self.dt_s;
+        let previewed = self.previewed_rad(&weights, curvature_1_m, ego.speed_m_s, step);
+        self.last_previewed_rad = previewed;
+        let command = steady_and_feedback + previewed;
         let limit = limits.lateral.max_road_wheel_rad;
         let command =
             command.clamp(self.last_rad - step, self.last_rad + step).clamp(-limit, limit);
@@ -181,6 +188,24 @@ impl LateralController {
         }
         self.last_rad = command;
         command
+    }
+
+    /// Part of the command that comes of the curvature ahead, rad; it changes by at most `step_rad`.
+    fn previewed_rad(
+        &self,
+        weights: &[(usize, f64); 4],
+        curvature_1_m: &[f64; PREVIEW_POINTS],
+        speed_m_s: f64,
+        step_rad: f64,
+    ) -> f64 {
+        let wanted = self.blend_scalar(weights, |p| {
+            let changes = curvature_1_m.windows(2).map(|k| k[1] - k[0]);
+            p.preview.iter().zip(changes).map(|(gain, change)| gain * change).sum()
+        });
+        let curvature_rate_1_ms = PREVIEWED_JERK_M_S3 / (speed_m_s * speed_m_s).max(1e-6);
+        let rate_rad_s = self.blend_scalar(weights, |p| p.model.u_steady) * curvature_rate_1_ms;
+        let step_rad = step_rad.min(rate_rad_s.abs() * self.dt_s);
+        wanted.clamp(self.last_previewed_rad - step_rad, self.last_previewed_rad + step_rad)
     }
 
     /// Road-wheel angle, rad, that holds a curve of this curvature in steady state: for steering
