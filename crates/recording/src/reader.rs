@@ -40,6 +40,13 @@ pub enum Entry {
         /// What is in it.
         data: Vec<u8>,
     },
+    /// A record of names and values (`run` says what was driven).
+    Record {
+        /// Its name.
+        name: String,
+        /// Its values.
+        values: BTreeMap<String, String>,
+    },
 }
 
 /// An open recording.
@@ -123,6 +130,7 @@ impl<'a> Reader<'a> {
             Record::Attachment { header, data, .. } => {
                 Some(Entry::Attachment { name: header.name, data: data.into_owned() })
             }
+            Record::Metadata(m) => Some(Entry::Record { name: m.name, values: m.metadata }),
             _ => None,
         }
     }

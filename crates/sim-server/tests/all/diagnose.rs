@@ -135,6 +135,60 @@ fn the_example_finds_what_it_hid_and_its_truck_drives() {
     assert!(!own.contains("http"), "and needs nothing else");
 }
 
+/// A drive's table by columns.
+struct Drive {
+    names: Vec<String>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Drive {
+    fn of(csv: &str) -> Self {
+        let mut lines = csv.lines();
+        let names = lines.next().unwrap().split(',').map(str::to_owned).collect();
+        let row = |l: &str| l.split(',').map(|x| x.parse().unwrap()).collect();
+        Self { names, rows: lines.map(row).collect() }
+    }
+
+    fn column(&self, name: &str) -> Vec<f64> {
+        let k = self.names.iter().position(|n| n == name).unwrap();
+        self.rows.iter().map(|row| row[k]).collect()
+    }
+}
+
+/// A recording says where its road was, not what it was: curvature comes of the road that is found
+/// there, if it is still the one that was driven.
+#[test]
+fn a_recording_whose_road_is_gone_or_another_has_no_curvature_and_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| text(&folder.path().join(name));
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    for name in ["scenario.toml", "road.csv", "truck.toml"] {
+        std::fs::copy(examples.join(name), at(name)).unwrap();
+    }
+    let run = ["run", &at("scenario.toml"), "--headless", "--duration", "100"];
+    assert!(support::server(&[&run[..], &["--out", &at("run")]].concat()).status.success());
+    let replayed = |out: &str| {
+        let given = ["replay", "--truck", "longhaul", "--drives", &at("run"), "--out", &at(out)];
+        let output = support::server(&given);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let table = std::fs::read_to_string(folder.path().join(out).join("drives/run.csv"));
+        let has = table.unwrap().lines().next().unwrap().contains("curvature_1_m");
+        (has, String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    assert!(replayed("whole").0);
+    let road = std::fs::read_to_string(at("road.csv")).unwrap();
+    let shorter: Vec<&str> = road.lines().take(road.lines().count() - 20).collect();
+    std::fs::write(at("road.csv"), shorter.join("\n")).unwrap();
+    let (has, said) = replayed("changed");
+    assert!(!has && said.contains("not the one that was driven"), "{said}");
+    std::fs::remove_file(at("road.csv")).unwrap();
+    let (has, said) = replayed("gone");
+    assert!(
+        !has && said.contains("no curvature of its road") && said.contains("road.csv"),
+        "{said}"
+    );
+}
+
 #[test]
 fn a_recording_is_reproduced_in_open_loop_and_the_accuracy_is_defined() {
     let folder = tempfile::tempdir().unwrap();
@@ -151,6 +205,22 @@ fn a_recording_is_reproduced_in_open_loop_and_the_accuracy_is_defined() {
     assert!(speed(serde_json::json!(60.0)) > 0.97, "{fidelity}");
     assert!(speed(serde_json::Value::Null) > 0.9, "{fidelity}");
     assert!(folder.path().join("out/replay.html").is_file());
+    let table = std::fs::read_to_string(folder.path().join("out/drives/run_20000.csv")).unwrap();
+    let drive = Drive::of(&table);
+    let road = road::Road::load("builtin:highway-sag").unwrap();
+    let stations_m = drive.column("s_map_m");
+    let on_map = |s_m: &f64| road.at(*s_m, 1.875).curvature_1_m;
+    let curves: Vec<f64> = stations_m.iter().map(on_map).collect();
+    assert!(curves.iter().any(|k| k.abs() > 2e-4), "the road bends");
+    for (k, driven) in curves.iter().zip(drive.column("curvature_1_m")) {
+        assert!((k - driven).abs() < 2e-5, "{k} {driven}");
+    }
+    // Uphill an accelerometer shows more than the speed's change, by gravity's part.
+    let speed_m_s = drive.column("gps_speed_m_s");
+    let changed_m_s2 = (speed_m_s[speed_m_s.len() - 1] - speed_m_s[0]) / 300.0;
+    let mean = |name: &str| drive.column(name).iter().sum::<f64>() / speed_m_s.len() as f64;
+    let found = mean("accel_x_m_s2") - changed_m_s2;
+    assert!((found - 9.80665 * mean("grade_frac")).abs() < 0.01, "{found}");
     let (missing, out) = (text(&folder.path().join("none")), text(&folder.path().join("other")));
     let refused = refused(&["replay", "--truck", "reference", "--drives", &missing, "--out", &out]);
     assert!(refused.contains("none"), "{refused}");
