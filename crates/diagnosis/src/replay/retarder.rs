@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use dynamics::SUBSTEP_S;
 use dynamics::effects::driveline::from_descent_frac;
+use tractrix_core::ZERO_DEGC_K;
 
 use super::inputs::pad;
 use super::prepared::Prepared;
@@ -20,7 +21,7 @@ pub(crate) const RETARDER_LAG_S: f64 = 0.005;
 const FILLS_S: f64 = 0.4;
 
 /// Force of a retarder that follows its stage, N: the file's, with `extra_nm` more at the propeller
-/// shaft.
+/// shaft, as far as the measured coolant leaves it.
 pub(super) fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<Arc<[f64]>> {
     let mut driveline = plant.truck.driveline.clone();
     if extra_nm != 0.0 {
@@ -34,8 +35,13 @@ pub(super) fn retarder_n(d: &Prepared, plant: &Plant, extra_nm: f64) -> Option<A
         d.profiles.get(Kind::Retarder, [extra_nm], || {
             let substeps = (Drive::STEP_S / SUBSTEP_S).round() as usize;
             let mut torque_nm = 0.0;
-            let steps = d.speed.iter().zip(&d.engine_brake).map(|(v, stage)| {
-                let target_nm = stage * driveline.retarder_limit_nm(*v);
+            let left = |coolant_degc: f64| {
+                let cooling = plant.truck.cooling.as_ref();
+                cooling.map_or(1.0, |c| c.retarder_left_frac(coolant_degc + ZERO_DEGC_K))
+            };
+            let asked = d.speed.iter().zip(&d.engine_brake).zip(&d.coolant);
+            let steps = asked.map(|((v, stage), coolant_degc)| {
+                let target_nm = stage * left(*coolant_degc) * driveline.retarder_limit_nm(*v);
                 for _ in 0..substeps {
                     torque_nm = driveline.retarder_step_nm(torque_nm, target_nm, SUBSTEP_S);
                 }
@@ -73,4 +79,34 @@ fn filled(asked: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
         now += follow * (asked - now);
         now
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use dynamics::TruckParameters;
+
+    use super::*;
+    use crate::Channel as C;
+
+    /// Simulated trucks derate their retarder when the coolant is hot; replayed ones held on with all of
+    /// it, which is 8 kN too much on a long descent.
+    #[test]
+    fn a_hot_retarder_is_replayed_with_what_its_coolant_leaves() {
+        let plant = Plant::of_truck(&TruckParameters::load("longhaul").unwrap()).unwrap();
+        let force_n = |coolant_degc: f64| {
+            let mut drive = Drive::new("descent", 0.0, 400);
+            drive.reported_mass_kg = Some(40_000.0);
+            for (c, x) in
+                [(C::SpeedMS, 20.0), (C::EngineBrakeFrac, 1.0), (C::CoolantTempDegc, coolant_degc)]
+            {
+                drive.set(c, vec![x; 400]);
+            }
+            let d = Prepared::new(&drive, &plant);
+            retarder_n(&d, &plant, 0.0).unwrap()[390]
+        };
+        let (cold_n, hot_n) = (force_n(90.0), force_n(102.85));
+        assert!(cold_n > 15_000.0, "{cold_n}");
+        // Halfway from 371 to 381 K.
+        assert!((hot_n / cold_n - 0.5).abs() < 1e-6, "{hot_n} of {cold_n}");
+    }
 }
