@@ -78,9 +78,9 @@ impl Problem<'_> {
 
     /// What drives that need not be in order teach all the same, because no cause can be it: when
     /// the logger writes its channels, how curves are banked, where the accelerometer sits; not the
-    /// fuel's level, which causes of the fuel are weighed against. Their lags are not linear over a sample, so that tolerances
-    /// must be about where they are: a lag of a sample that was left to a tolerance was an effect
-    /// outside the catalogue at every released pedal.
+    /// fuel's level, which causes of the fuel are weighed against. Their lags are not linear over a
+    /// sample, so that tolerances must be about where they are: a lag of a sample that was left to a
+    /// tolerance was an effect outside the catalogue at every released pedal.
     pub(super) fn recentre(&mut self) -> Result<(), DiagnosisError> {
         for _ in 0..RECENTRED {
             let directions = nuisance_directions(&self.reference.tolerance);

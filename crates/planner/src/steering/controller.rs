@@ -28,8 +28,9 @@ pub(crate) const PREVIEW_POINTS: usize = 26;
 /// Spacing of the preview, s.
 pub(crate) const PREVIEW_STEP_S: f64 = 0.1;
 
-/// Lateral jerk of a steady curve that the previewed part of the command may ask for, m/s^3 (UN
-/// Regulation 79, 5.6.2.1.3: the bound of an automatically commanded steering function).
+/// Lateral jerk of a steady curve that the previewed part of the command may ask for, m/s^3. UN
+/// Regulation 79 allows automatically commanded steering as much, as the mean of half a second; here
+/// it bounds every moment.
 const PREVIEWED_JERK_M_S3: f64 = 5.0;
 
 const SPEEDS_M_S: [f64; 10] = [3.0, 5.0, 7.5, 10.0, 12.5, 15.0, 18.0, 22.0, 26.0, 30.0];

@@ -12,4 +12,4 @@ pub(crate) use pair::compare;
 pub(crate) use recorded::{
     AsRecorded, RecordedBus, RecordedPose, RecordedTraffic, RecordedVehicle,
 };
-pub(crate) use setup::{Setup, driver_setup};
+pub(crate) use setup::{Setup, check_road, driver_setup};

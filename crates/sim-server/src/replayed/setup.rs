@@ -63,17 +63,10 @@ impl Setup {
             (None, None, None, None) => return Err(lacks("road in its record `run`")),
         };
         let road = road.map_err(Failure::input)?;
-        let found = sim::road_fingerprint(&road);
         match about.value("run", "road_fingerprint") {
             None if other_road.is_none() && about.text("road.xodr").is_some() => {}
             None => output::note("the recording cannot tell whether the road is still the same"),
-            Some(driven) if driven == found => {}
-            Some(driven) => {
-                let name = road.name();
-                let why =
-                    format!("road {name} is not the one that was driven ({found}, not {driven})");
-                return Err(Failure::file(file, why));
-            }
+            Some(driven) => check_road(&road, driven).map_err(|why| Failure::file(file, why))?,
         }
         let revision = about.value("run", "git_revision").unwrap_or("unknown");
         if revision != GIT_REVISION {
@@ -104,6 +97,18 @@ impl Setup {
         }
         Arc::clone(self.limited.as_ref().map_or(&self.road, |(_, road)| road))
     }
+}
+
+/// Whether a road is the one that was driven, by its fingerprint; else why not.
+///
+/// # Errors
+/// Says which road it is not, with both fingerprints.
+pub(crate) fn check_road(road: &Road, driven: &str) -> Result<(), String> {
+    let (name, found) = (road.name(), sim::road_fingerprint(road));
+    if found == driven {
+        return Ok(());
+    }
+    Err(format!("road {name} is not the one that was driven ({found}, not {driven})"))
 }
 
 /// What the truck's driver on its bus was set up with.

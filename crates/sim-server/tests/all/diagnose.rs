@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use crate::support;
+use crate::support::columns::Columns;
 use crate::support::refused;
+use tractrix_core::GRAVITY_M_S2;
 
 fn drives(folder: &Path, index: &str, table: &str) -> String {
     std::fs::write(folder.join("drives.toml"), index).unwrap();
@@ -135,26 +137,6 @@ fn the_example_finds_what_it_hid_and_its_truck_drives() {
     assert!(!own.contains("http"), "and needs nothing else");
 }
 
-/// A drive's table by columns.
-struct Drive {
-    names: Vec<String>,
-    rows: Vec<Vec<f64>>,
-}
-
-impl Drive {
-    fn of(csv: &str) -> Self {
-        let mut lines = csv.lines();
-        let names = lines.next().unwrap().split(',').map(str::to_owned).collect();
-        let row = |l: &str| l.split(',').map(|x| x.parse().unwrap()).collect();
-        Self { names, rows: lines.map(row).collect() }
-    }
-
-    fn column(&self, name: &str) -> Vec<f64> {
-        let k = self.names.iter().position(|n| n == name).unwrap();
-        self.rows.iter().map(|row| row[k]).collect()
-    }
-}
-
 /// A recording says where its road was, not what it was: curvature comes of the road that is found
 /// there, if it is still the one that was driven.
 #[test]
@@ -171,9 +153,8 @@ fn a_recording_whose_road_is_gone_or_another_has_no_curvature_and_says_so() {
         let given = ["replay", "--truck", "longhaul", "--drives", &at("run"), "--out", &at(out)];
         let output = support::server(&given);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let table = std::fs::read_to_string(folder.path().join(out).join("drives/run.csv"));
-        let has = table.unwrap().lines().next().unwrap().contains("curvature_1_m");
-        (has, String::from_utf8_lossy(&output.stderr).into_owned())
+        let table = Columns::read(&at(&format!("{out}/drives/run.csv")));
+        (table.has("curvature_1_m"), String::from_utf8_lossy(&output.stderr).into_owned())
     };
     assert!(replayed("whole").0);
     let road = std::fs::read_to_string(at("road.csv")).unwrap();
@@ -205,22 +186,21 @@ fn a_recording_is_reproduced_in_open_loop_and_the_accuracy_is_defined() {
     assert!(speed(serde_json::json!(60.0)) > 0.97, "{fidelity}");
     assert!(speed(serde_json::Value::Null) > 0.9, "{fidelity}");
     assert!(folder.path().join("out/replay.html").is_file());
-    let table = std::fs::read_to_string(folder.path().join("out/drives/run_20000.csv")).unwrap();
-    let drive = Drive::of(&table);
+    let drive = Columns::read(&text(&folder.path().join("out/drives/run_20000.csv")));
     let road = road::Road::load("builtin:highway-sag").unwrap();
-    let stations_m = drive.column("s_map_m");
+    let stations_m = drive.of("s_map_m");
     let on_map = |s_m: &f64| road.at(*s_m, 1.875).curvature_1_m;
     let curves: Vec<f64> = stations_m.iter().map(on_map).collect();
     assert!(curves.iter().any(|k| k.abs() > 2e-4), "the road bends");
-    for (k, driven) in curves.iter().zip(drive.column("curvature_1_m")) {
+    for (k, driven) in curves.iter().zip(drive.of("curvature_1_m")) {
         assert!((k - driven).abs() < 2e-5, "{k} {driven}");
     }
     // Uphill an accelerometer shows more than the speed's change, by gravity's part.
-    let speed_m_s = drive.column("gps_speed_m_s");
+    let speed_m_s = drive.of("gps_speed_m_s");
     let changed_m_s2 = (speed_m_s[speed_m_s.len() - 1] - speed_m_s[0]) / 300.0;
-    let mean = |name: &str| drive.column(name).iter().sum::<f64>() / speed_m_s.len() as f64;
+    let mean = |name: &str| drive.of(name).iter().sum::<f64>() / speed_m_s.len() as f64;
     let found = mean("accel_x_m_s2") - changed_m_s2;
-    assert!((found - 9.80665 * mean("grade_frac")).abs() < 0.01, "{found}");
+    assert!((found - GRAVITY_M_S2 * mean("grade_frac")).abs() < 0.01, "{found}");
     let (missing, out) = (text(&folder.path().join("none")), text(&folder.path().join("other")));
     let refused = refused(&["replay", "--truck", "reference", "--drives", &missing, "--out", &out]);
     assert!(refused.contains("none"), "{refused}");

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::support::columns::Columns;
 use crate::support::{refused, server};
 use serde_json::Value;
 
@@ -42,18 +43,15 @@ fn half_a_minute_of_a_real_truck_becomes_a_drive_that_says_where_it_is_from() {
     assert_eq!(mass["missing_columns"], serde_json::json!(["grade_frac"]));
     let said = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(said.contains("for want of grade_frac, of: rolling_resistance"), "{said}");
-    let table = read("t270_normal_1.csv");
-    let mut lines = table.lines();
-    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let at = |name: &str| header.iter().position(|h| *h == name).unwrap();
-    let rows: Vec<Vec<f64>> =
-        lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
-    assert!(rows.len() > 550, "{} rows", rows.len());
-    let speeds = rows.iter().map(|r| r[at("speed_m_s")]);
-    let (least, most) = speeds.fold((f64::MAX, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
+    let table = Columns::read(&Path::new(&out).join("t270_normal_1.csv").display().to_string());
+    assert!(table.rows.len() > 550, "{} rows", table.rows.len());
+    let (least, most) = table
+        .of("speed_m_s")
+        .into_iter()
+        .fold((f64::MAX, 0.0_f64), |(a, b), v| (a.min(v), b.max(v)));
     // the README of the log: 23 to 55 km/h, gears 2 to 4
     assert!((5.0..8.0).contains(&least) && (14.0..16.0).contains(&most), "{least} {most}");
-    assert!(rows.iter().all(|r| (2.0..=4.0).contains(&r[at("gear")]) || r[at("gear")].is_nan()));
+    assert!(table.of("gear").iter().all(|g| (2.0..=4.0).contains(g) || g.is_nan()));
     let index = read("drives.toml");
     assert!(index.contains("truck = \"reference\"") && !index.contains("reported_mass_kg"));
     let line = refused(&[&command[..], &["--out", &out]].concat());
@@ -128,21 +126,15 @@ fn a_log_of_a_run_on_a_built_in_road_finds_its_grade_by_position() {
     let rest = ["--mass-kg", "40000", "--map", "builtin:highway-sag", "--out", &at("drives")];
     let output = server(&[&drives[..], &rest].concat());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let table = std::fs::read_to_string(at("drives/bus_1.csv")).unwrap();
-    let mut lines = table.lines();
-    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
-    let (s_m, speed_m_s) = (column("s_map_m"), column("speed_m_s"));
     let road = road::Road::load("builtin:highway-sag").unwrap();
     let map = std::fs::read_to_string(at("drives/map.csv")).unwrap();
     let grade = map.lines().nth(401).unwrap().split(',').nth(1).unwrap().parse::<f64>().unwrap();
     assert!((grade - road.at(2_000.0, 0.0).grade_rad.tan()).abs() < 1e-9, "{grade}");
-    let rows: Vec<Vec<f64>> =
-        lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect()).collect();
-    let (first, last) = (&rows[0], &rows[rows.len() - 1]);
-    let driven_m = last[s_m] - first[s_m];
-    assert!(driven_m > 1_000.0 && last[speed_m_s] > 10.0, "{driven_m}");
-    assert!(rows.windows(2).all(|w| w[1][s_m] > w[0][s_m]), "the place goes on");
+    let table = Columns::read(&at("drives/bus_1.csv"));
+    let (s_m, speed_m_s) = (table.of("s_map_m"), table.of("speed_m_s"));
+    let driven_m = s_m[s_m.len() - 1] - s_m[0];
+    assert!(driven_m > 1_000.0 && *speed_m_s.last().unwrap() > 10.0, "{driven_m}");
+    assert!(s_m.is_sorted_by(|a, b| a < b), "the place goes on");
 }
 
 /// A DBC with a message of the maker: speed in km/h, hand wheel in degrees, positive to the right.
@@ -184,20 +176,13 @@ fn a_maker_s_signals_fill_columns_by_name_and_by_number_in_the_column_s_unit() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let said = String::from_utf8(output.stdout).unwrap();
     assert!(said.contains("speed_m_s from OEM1.Speed of 21 every 50 ms"), "{said}");
-    let table = std::fs::read_to_string(at("drives/own_1.csv")).unwrap();
-    let mut lines = table.lines();
-    let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let column = |name: &str| header.iter().position(|h| *h == name).unwrap();
-    let (time, speed, wheel) =
-        (column("time_s"), column("speed_m_s"), column("steering_wheel_rad"));
-    let mut rows = 0;
-    for row in lines.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>()) {
-        let t = row[time];
-        assert!((row[speed] - (15.0 + 5.0 * (0.1 * t).sin())).abs() < 0.02, "{row:?}");
-        assert!((row[wheel] + (10.0 * (0.2 * t).sin()).to_radians()).abs() < 0.01, "{row:?}");
-        rows += 1;
+    let table = Columns::read(&at("drives/own_1.csv"));
+    let rows = table.of("time_s").into_iter().zip(table.of("speed_m_s"));
+    for ((t, speed), wheel) in rows.zip(table.of("steering_wheel_rad")) {
+        assert!((speed - (15.0 + 5.0 * (0.1 * t).sin())).abs() < 0.02, "{t} {speed}");
+        assert!((wheel + (10.0 * (0.2 * t).sin()).to_radians()).abs() < 0.01, "{t} {wheel}");
     }
-    assert!(rows > 2000, "{rows}");
+    assert!(table.rows.len() > 2000, "{}", table.rows.len());
 }
 
 #[test]

@@ -9,6 +9,7 @@
 )]
 
 pub mod client;
+pub mod columns;
 pub mod run;
 pub mod serving;
 

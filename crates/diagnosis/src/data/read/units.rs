@@ -90,11 +90,11 @@ fn hand_wheel(drive: &mut Drive, note: &mut Note<'_>) {
 /// A pressure in bar or psi shows in the deceleration. What seems to be psi could be a light
 /// application beside a retarder whose demand is not measured: it is not used.
 fn brake_pressure(drive: &mut Drive, note: &mut Note<'_>) {
-    let Some((slowed_m_s2, largest)) = slowed_by_pressure(drive) else { return };
-    if slowed_m_s2 * largest < BRAKED_M_S2 {
+    let Some((per_unit_m_s2, largest)) = slowed_by_pressure(drive) else { return };
+    if per_unit_m_s2 * largest < BRAKED_M_S2 {
         return;
     }
-    let within = |[least, most]: [f64; 2]| (least..most).contains(&slowed_m_s2);
+    let within = |[least, most]: [f64; 2]| (least..most).contains(&per_unit_m_s2);
     let name = Some(Channel::BrakePressureKpa.name());
     if within(BAR_M_S2) && largest <= MOST_BAR {
         scale(drive, Channel::BrakePressureKpa, 100.0);

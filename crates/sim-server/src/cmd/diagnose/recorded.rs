@@ -19,6 +19,7 @@ use diagnosis::Table;
 use super::folder::STEP_S;
 use crate::failure::Failure;
 use crate::output;
+use crate::replayed::check_road;
 
 /// Name of a recording in its folder.
 const RECORDING: &str = "run.mcap";
@@ -160,13 +161,8 @@ pub(super) fn table(path: &Path, truck: &TruckParameters, seed: u64) -> Result<T
 /// The road that was driven, or why it is not to be had.
 fn road_of(scenario: &Scenario, fingerprint: Option<&str>) -> Result<Road, String> {
     let road = scenario.load_road().map_err(|e| e.to_string())?;
-    let found = sim::road_fingerprint(&road);
-    match fingerprint {
-        Some(driven) if driven != found => {
-            Err(format!("road {} is not the one that was driven", road.name()))
-        }
-        _ => Ok(road),
-    }
+    fingerprint.map_or(Ok(()), |driven| check_road(&road, driven))?;
+    Ok(road)
 }
 
 struct Reader {
